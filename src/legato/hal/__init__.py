@@ -1,0 +1,1 @@
+"""What a driver implements: an arm, a camera, a clock. Protocols, their data and their errors."""
