@@ -1,0 +1,107 @@
+"""Levenberg-Marquardt: optima, boxes, priors, left-out marks."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from legato.calibration.cost import cost, prepare
+from legato.calibration.derivatives import normal_equations
+from legato.calibration.problem import PAPER_BOUNDS, Problem
+from legato.calibration.refine import refine
+from legato.geometry.transforms import Array, angles_from_rotation
+
+
+def near(genes: Array, count: int, seed: int) -> Array:
+    """Return starts around genes."""
+    spread = np.array([0.1, 2, 2, 5, 5, 5, 5, 5, 0.1, 0.1, 0.1])
+    return np.asarray(genes + np.random.default_rng(seed).normal(0.0, 1.0, (count, 11)) * spread)
+
+
+def test_many_starts_reach_one_optimum(scenes: Any, truth: Any) -> None:
+    """Starts around the truth end at the same cost, with a gradient of zero."""
+    scene = scenes.paper("a")
+    model = prepare(replace(scene.problem, bounds=wide(scene.problem)))
+    result = refine(model, near(truth(scene), 20, 1))
+    assert result.converged.all()
+    np.testing.assert_allclose(result.cost, result.cost.min(), rtol=1e-9)
+    _, hessian, gradient = normal_equations(model, result.genes, np.ones((20, 7)))
+    scaled = gradient / np.sqrt(np.einsum("bii->bi", hessian))
+    assert np.abs(scaled).max() < 1e-5
+
+
+def test_bounded_optima_meet_the_conditions_of_optimality(scenes: Any, truth: Any) -> None:
+    """On a bound the gradient pushes outward, elsewhere it is zero; nothing leaves the box."""
+    scene = scenes.paper("a", sigma=1.0)
+    bounds = {**PAPER_BOUNDS, "v0": (210.0, 290.0), "t_z": (0.0, 140.0)}
+    model = prepare(replace(scene.problem, bounds=bounds))
+    result = refine(model, near(truth(scene), 10, 2))
+    best = result.genes[np.argmin(result.cost)][None]
+    low, high = model.box
+    assert (best >= low).all()
+    assert (best <= high).all()
+    assert best[0, 4] == 290.0 or best[0, 7] == 140.0
+    _, hessian, gradient = normal_equations(model, best, np.ones((1, 7)))
+    scaled = gradient[0] / np.sqrt(np.diag(hessian[0]))
+    at_low, at_high = best[0] <= low, best[0] >= high
+    assert (scaled[at_low] >= -1e-6).all()
+    assert (scaled[at_high] <= 1e-6).all()
+    assert np.abs(scaled[~at_low & ~at_high]).max() < 1e-4
+
+
+def test_no_step_raises_the_cost(scenes: Any) -> None:
+    """From anywhere before the camera the result costs no more than the start."""
+    model = prepare(scenes.paper("c").problem)
+    starts = np.random.default_rng(3).uniform(model.search[0], model.search[1], (100, 11))
+    result = refine(model, starts)
+    assert (result.cost <= cost(model, starts)).all()
+    solved = np.isfinite(result.cost)
+    assert solved.any()
+    np.testing.assert_allclose(
+        cost(model, result.genes)[solved], result.cost[solved], rtol=1e-9, atol=1e-12
+    )
+
+
+def test_a_batch_is_its_members(scenes: Any, truth: Any) -> None:
+    """What is refined together is what is refined alone."""
+    scene = scenes.paper("d")
+    model = prepare(scene.problem)
+    starts = near(truth(scene), 4, 4)
+    together = refine(model, starts)
+    for i in range(4):
+        alone = refine(model, starts[i : i + 1])
+        np.testing.assert_allclose(alone.genes[0], together.genes[i], rtol=1e-6, atol=1e-6)
+
+
+def test_a_left_out_mark_has_no_pull(scenes: Any, truth: Any) -> None:
+    """With weight zero a mark 300 px off leaves the optimum where it was."""
+    scene = scenes.paper("a", scenes.ten)
+    pixels = scene.problem.pixels.copy()
+    pixels[9] += 300.0
+    weights = np.ones((1, 10))
+    weights[0, 9] = 0.0
+    start = truth(scene)[None]
+    clean = refine(prepare(scene.problem), start, weights)
+    spoilt = refine(prepare(replace(scene.problem, pixels=pixels)), start, weights)
+    np.testing.assert_allclose(clean.genes, spoilt.genes, rtol=1e-7, atol=1e-7)
+
+
+def test_the_prior_pulls_by_its_weight(scenes: Any) -> None:
+    """A tight covariance holds the intrinsics, a loose one lets the marks move them."""
+    scene = scenes.random(3, scenes.ten)
+    wrong = replace(scene.intrinsics, alpha_u=scene.intrinsics.alpha_u * 1.01)
+    moved = []
+    for sigma in (1e-3, 100.0):
+        covariance = np.diag([sigma**2] * 4 + [0.0, 0.0])
+        model = prepare(scene.known(covariance, wrong))
+        start = model.mean.copy()
+        start[5:8] = scene.camera_from_object[:3, 3]
+        start[8:11] = angles_from_rotation(scene.camera_from_object[:3, :3])
+        moved.append(abs(refine(model, start[None]).genes[0, 1] - wrong.alpha_u))
+    assert moved[0] < 1e-3
+    assert moved[1] > 1.0
+
+
+def wide(problem: Problem) -> dict[str, tuple[float, float]]:
+    """Return bounds that no optimum near the truth touches."""
+    return {**problem.bounds, "u0": (0.0, 768.0), "v0": (0.0, 576.0), "t_z": (0.0, 900.0)}
