@@ -1,0 +1,1 @@
+"""From pixels to named marks. Pure: arrays and bytes in, marks out."""

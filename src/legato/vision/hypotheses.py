@@ -1,0 +1,178 @@
+"""What labelling weighs: poses that put three marks on three candidates, and what each explains.
+
+A pose counts the marks that face the camera and lie near a candidate whose edges run as a pasted
+mark's would.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from legato.geometry.leg import Leg
+from legato.geometry.projection import Intrinsics, distort
+from legato.geometry.transforms import Array, apply, rotation_from_vector, transform
+from legato.vision.saddle import Candidates
+from legato.vision.view import SMALLEST_FACING
+
+MOST_TRIPLES = 1500  # ordered triples of candidates tried for one triple of marks
+REACH = 24.0  # px at width 768 within which a pose from wrong intrinsics still counts
+EDGE_TOLERANCE = np.radians(18.0)
+TURNS = np.radians([-12.0, -6.0, 0.0, 6.0, 12.0])  # a hand pastes marks on this straight
+
+
+@dataclass(frozen=True)
+class Target:
+    """The leg as labelling needs it: (M, 3) centres and normals, (M, 2, 3) edge directions."""
+
+    leg: Leg
+    points: Array
+    normals: Array
+    along: Array
+
+    @classmethod
+    def of(cls, leg: Leg) -> "Target":
+        """Take the marks' tangents and normals off the leg."""
+        h, names = 0.5, leg.names()
+        ends = [leg.mark_surface(n, [[h, 0.0], [-h, 0.0], [0.0, h], [0.0, -h]]) for n in names]
+        along = np.array([[e[0] - e[1], e[2] - e[3]] for e in ends])
+        normals = np.array(
+            [
+                (-1.0, 0.0, 0.0) if leg.on_face(n) else leg.surface_normal(leg.mark_angle(n))
+                for n in names
+            ]
+        )
+        return cls(leg, leg.points(), normals, along)
+
+    def facing(self, poses: Array) -> Array:
+        """Return the cosine (H, M) between marks' normals and the way to the camera."""
+        eyes = -np.einsum("hji,hj->hi", poses[:, :3, :3], poses[:, :3, 3])
+        away = eyes[:, None] - self.points
+        return np.asarray((away * self.normals).sum(-1) / np.linalg.norm(away, axis=-1))
+
+
+def mark_triples(target: Target, most: int) -> list[tuple[int, ...]]:
+    """Return at most so many triples of marks, large ones first, each mark coming early."""
+    triples = np.array(list(combinations(range(len(target.points)), 3)))
+    p = target.points[triples]
+    area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=-1) / 2.0
+    together = (
+        (target.normals[triples][:, [0, 0, 1]] * target.normals[triples][:, [1, 2, 2]])
+        .sum(axis=-1)
+        .min(axis=1)
+    )
+    # Marks that face different ways are seldom seen together, and slivers give no pose.
+    value = np.sqrt(area) * (0.4 + np.maximum(together, 0.0))
+    used = np.zeros(len(target.points))
+    order = []
+    for _ in range(min(most, len(triples))):
+        k = int(np.argmax(value / (1.0 + used[triples].sum(axis=1))))
+        order.append(tuple(int(i) for i in triples[k]))
+        used[triples[k]] += 1.0
+        value[k] = -1.0
+    return order
+
+
+def candidate_triples(n: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Return ordered triples (T, 3) of n candidates: all of them, or a draw where they are many."""
+    if n * (n - 1) * (n - 2) <= MOST_TRIPLES:
+        a, b, c = np.meshgrid(*[np.arange(n)] * 3, indexing="ij")
+        every = np.stack([a.ravel(), b.ravel(), c.ravel()], axis=-1)
+    else:
+        every = rng.integers(0, n, size=(MOST_TRIPLES, 3))
+    i, j, k = every.T
+    return np.asarray(every[(i != j) & (j != k) & (i != k)])
+
+
+def poses_of(
+    target: Target,
+    triple: tuple[int, ...],
+    chosen: NDArray[np.intp],
+    pixels: Array,
+    nominal: Intrinsics,
+) -> Array:
+    """Return the poses (H, 4, 4) that put three marks on chosen pixels and facing the camera."""
+    matrix, points = nominal.matrix(), target.points[list(triple)]
+    none = np.zeros(0)  # the pixels are free of distortion already
+    rotations: list[object] = []
+    translations: list[object] = []
+    for rows in pixels[chosen]:
+        _, turns, shifts = cv2.solveP3P(points, rows, matrix, none, cv2.SOLVEPNP_P3P)
+        rotations += turns
+        translations += shifts
+    if not rotations:
+        return np.zeros((0, 4, 4))
+    r = np.array(rotations, dtype=float)[..., 0]
+    t = np.array(translations, dtype=float)[..., 0]
+    good = np.isfinite(r).all(axis=1) & np.isfinite(t).all(axis=1) & (t[:, 2] > 0.0)
+    poses = transform(rotation_from_vector(r[good]), t[good])
+    seen = target.facing(poses)[:, list(triple)].min(axis=1) > SMALLEST_FACING
+    return np.asarray(poses[seen])
+
+
+def most_telling(
+    poses: Array, candidates: Candidates, target: Target, nominal: Intrinsics
+) -> Array:
+    """Return the few poses that explain most, first by places, then by the edges' run too."""
+    if not len(poses):
+        return poses
+    reach = REACH * scale_of(nominal)
+    value = _explained(poses, candidates, target, nominal, reach, edges=False)
+    poses = poses[np.argsort(-value, kind="stable")[:60]]
+    value = _explained(poses, candidates, target, nominal, reach, edges=True)
+    order = np.argsort(-value, kind="stable")[:6]
+    return np.asarray(poses[order[value[order] > 2.0]])
+
+
+def _explained(
+    poses: Array,
+    candidates: Candidates,
+    target: Target,
+    nominal: Intrinsics,
+    reach: float,
+    edges: bool,
+) -> Array:
+    """Return for each pose (H,) the marks near candidates, less a part of those in vain."""
+    camera = apply(poses, target.points)
+    depth = camera[..., 2:]
+    ahead = (depth[..., 0] > 1.0) & (target.facing(poses) > SMALLEST_FACING)
+    places = distort(nominal, camera[..., :2] / np.maximum(depth, 1.0))
+    d = np.linalg.norm(places[:, :, None] - candidates.pixels, axis=-1)
+    if edges:
+        d = np.where(edges_fit(poses, candidates, target, nominal), d, np.inf)
+    near = np.maximum(0.0, 1.0 - d.min(axis=-1) / reach)
+    expected = np.asarray(ahead & (nominal.sees(places, 4.0) > 0))
+    return np.asarray((near * ahead).sum(axis=1) - 0.2 * (expected & (near == 0.0)).sum(axis=1))
+
+
+def edges_fit(
+    poses: Array, candidates: Candidates, target: Target, nominal: Intrinsics
+) -> NDArray[np.bool_]:
+    """Say (H, M, N) whether a candidate's edges run as those of a mark there would."""
+    camera = apply(poses, target.points)[:, :, None]
+    depth = np.maximum(camera[..., 2], 1.0)
+    tangent = np.einsum("hij,mkj->hmki", poses[:, :3, :3], target.along)
+    image = (tangent[..., :2] - tangent[..., 2:] * camera[..., :2] / depth[..., None]) * [
+        nominal.alpha_u,
+        nominal.alpha_v,
+    ]
+    c, s = np.cos(TURNS), np.sin(TURNS)
+    turned = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], axis=1)  # (T, 2, 2)
+    run = np.einsum("tek,hmki->hmtei", turned, image)
+    predicted = np.arctan2(run[..., 1], run[..., 0])[:, :, None]  # (H, M, 1, T, 2)
+    seen = candidates.edges[None, None, :, None, :]
+    straight = _line_angle(predicted - seen).max(axis=-1)
+    crossed = _line_angle(predicted - seen[..., ::-1]).max(axis=-1)
+    return np.asarray(np.minimum(straight, crossed).min(axis=-1) < EDGE_TOLERANCE)
+
+
+def scale_of(nominal: Intrinsics) -> float:
+    """Return how much larger the picture is than the one that the limits are given for."""
+    return max(1.0, nominal.width / 768.0)
+
+
+def _line_angle(angle: Array) -> Array:
+    """Return the size of angles between lines, at most a quarter turn."""
+    return np.abs((angle + np.pi / 2.0) % np.pi - np.pi / 2.0)
