@@ -1,0 +1,186 @@
+"""JSON-RPC 2.0 over ZeroMQ frames: bytes to calls and back, without a socket.
+
+Every message gives a `Call` or a `Malformed` with the error to answer; nothing raises. One frame
+of JSON follows the sender's identity, with or without an empty delimiter, and the answer goes back
+the same way. Batches, NaN, deep or huge documents and parameters by position are refused.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, cast
+
+import msgspec
+
+from legato.wire.requests import REQUESTS, Request
+
+MAX_BYTES: Final = 64 * 1024
+MAX_DEPTH: Final = 16
+MAX_ID_LENGTH: Final = 256
+
+Id = str | int | float | None
+Route = tuple[bytes, ...]
+
+CODES: Final[dict[str, int]] = {
+    "parse_error": -32700,
+    "invalid_request": -32600,
+    "method_not_found": -32601,
+    "invalid_params": -32602,
+    "internal_error": -32603,
+    "refused_in_state": -32000,
+    "precondition": -32001,
+    "not_authorised": -32002,
+    "busy": -32003,
+    "in_fault": -32004,
+    "unavailable": -32005,
+    "expired": -32006,
+}
+
+
+class Failure(Exception):
+    """An error to answer with: its name in CODES, why, and what to do."""
+
+    def __init__(self, name: str, reason: str, hint: str = "") -> None:
+        self.name = name
+        self.code = CODES[name]
+        self.reason = reason
+        self.hint = hint
+        super().__init__(f"{name}: {reason}")
+
+
+@dataclass(frozen=True)
+class Call:
+    """A well-formed request: who is to be answered, and what is asked."""
+
+    route: Route
+    method: str
+    params: Mapping[str, Any] = field(default_factory=dict)
+    id: Id = None
+    notification: bool = False
+
+
+@dataclass(frozen=True)
+class Malformed:
+    """A message that is no request, with the error to answer."""
+
+    route: Route
+    failure: Failure
+    id: Id = None
+
+
+def receive(frames: Sequence[bytes]) -> Call | Malformed:
+    """Return what the frames of one ROUTER message say; the first is the sender's identity."""
+    route, body = _split(frames)
+    if body is None:
+        text = f"a request is one frame of JSON, this message has {len(frames) - 1}"
+        return Malformed(route, Failure("invalid_request", text))
+    if len(body) > MAX_BYTES:
+        text = f"{len(body)} bytes, at most {MAX_BYTES}"
+        return Malformed(route, Failure("invalid_request", text))
+    try:
+        document = msgspec.json.decode(body)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError, ValueError) as error:
+        return Malformed(route, Failure("parse_error", f"not JSON: {error}"))
+    return _call(route, document)
+
+
+def decode_params(call: Call) -> Request:
+    """Return the typed request of a call; raises Failure (unknown method, unfit parameters)."""
+    kind = REQUESTS.get(call.method)
+    if kind is None:
+        name = call.method[:64]
+        raise Failure("method_not_found", f"there is no method {name!r}", "describe lists them all")
+    try:
+        return cast(Request, msgspec.convert(call.params, kind, strict=True))
+    except msgspec.ValidationError as error:
+        hint = "describe gives each method's parameters"
+        raise Failure("invalid_params", f"{call.method}: {error}", hint) from error
+
+
+def answer(route: Route, call_id: Id, result: Any) -> list[bytes]:
+    """Return the frames of a result."""
+    return [*route, encode({"jsonrpc": "2.0", "id": call_id, "result": result})]
+
+
+def refuse(route: Route, call_id: Id, failure: Failure, state: str) -> list[bytes]:
+    """Return the frames of an error, with the state that the cell is in."""
+    data = {"reason": failure.reason, "state": state, "hint": failure.hint}
+    error = {"code": failure.code, "message": failure.name, "data": data}
+    return [*route, encode({"jsonrpc": "2.0", "id": call_id, "error": error})]
+
+
+def encode(document: Any) -> bytes:
+    """Return JSON; numbers that are not finite become null, since JSON has none.
+
+    Arrays and numpy's numbers go as lists and numbers; what JSON cannot say goes as its text.
+    """
+    return msgspec.json.encode(document, enc_hook=_plain)
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def _split(frames: Sequence[bytes]) -> tuple[Route, bytes | None]:
+    """Return whom to answer and how, and the body, None where there is not exactly one."""
+    identity, rest = frames[0], list(frames[1:])
+    if rest and rest[0] == b"" and len(rest) > 1:
+        return (identity, b""), rest[1] if len(rest) == 2 else None
+    return (identity,), rest[0] if len(rest) == 1 else None
+
+
+def _call(route: Route, document: Any) -> Call | Malformed:
+    """Return the call that a decoded document is."""
+
+    def malformed(reason: str, name: str = "invalid_request") -> Malformed:
+        return Malformed(route, Failure(name, reason), call_id)
+
+    call_id: Id = None
+    if isinstance(document, list):
+        return malformed("batches are not supported: send one request a message")
+    if not isinstance(document, dict):
+        return malformed("a request is a JSON object")
+    if _is_id(document.get("id")):
+        call_id = document.get("id")
+    elif "id" in document:
+        return malformed(f"id is a number, null, or a string of at most {MAX_ID_LENGTH} characters")
+    if _too_deep(document):
+        return malformed(f"nested deeper than {MAX_DEPTH}")
+    if document.get("jsonrpc") != "2.0":
+        return malformed('jsonrpc must be "2.0"')
+    method, params = document.get("method"), document.get("params", {})
+    if not isinstance(method, str):
+        return malformed("method must be a string")
+    # A `key` beside `params` instead of in it would make a repeated job run twice.
+    unknown = sorted(set(document) - {"jsonrpc", "id", "method", "params"})
+    if unknown:
+        return malformed(f"unknown member {unknown[0][:64]!r}: parameters belong into params")
+    if not isinstance(params, dict):
+        return malformed("params is an object: parameters go by name", "invalid_params")
+    return Call(route, method, params, call_id, notification="id" not in document)
+
+
+def _is_id(value: Any) -> bool:
+    """Say whether a value can be a call's id and can be sent back as it came."""
+    if isinstance(value, bool):
+        return False
+    if isinstance(value, int):
+        return -(2**63) <= value < 2**64
+    if isinstance(value, str):
+        return len(value) <= MAX_ID_LENGTH
+    return value is None or isinstance(value, float)
+
+
+def _too_deep(document: Any) -> bool:
+    """Say whether a decoded document is nested deeper than MAX_DEPTH."""
+    level = [document]
+    for _ in range(MAX_DEPTH + 1):
+        level = [child for item in level for child in _children(item)]
+        if not level:
+            return False
+    return True
+
+
+def _children(item: Any) -> Sequence[Any]:
+    if isinstance(item, dict):
+        return list(item.values())
+    return item if isinstance(item, list) else ()

@@ -1,0 +1,161 @@
+"""What may be asked: one type a method, whose fields are the method's parameters.
+
+Names and meanings are part of the wire. Unknown parameters and wrong types are refused.
+"""
+
+from typing import Annotated, Any, Final
+
+import msgspec
+from msgspec import Meta, Struct
+
+API: Final = "1"
+OUTCOMES: Final = ("done", "stopped", "refused", "fault", "interrupted")
+TOPICS: Final = ("state", "progress", "telemetry", "contact", "fault", "session", "heartbeat")
+
+Name = Annotated[str, Meta(min_length=1, max_length=128)]
+Point = tuple[float, float, float]
+
+
+class Ping(Struct, frozen=True, forbid_unknown_fields=True):
+    """Say that the daemon lives: boot and uptime."""
+
+
+class Status(Struct, frozen=True, forbid_unknown_fields=True):
+    """Return the state of the cell, its arm, camera, calibration and fault."""
+
+
+class Describe(Struct, frozen=True, forbid_unknown_fields=True):
+    """Return methods, states, the table of both, errors, fault causes and outcomes."""
+
+
+class Job(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Start a job and return its session at once.
+
+    The same `key` again returns the same session and starts nothing.
+    """
+
+    key: Name | None = None
+
+
+class Run(Job, frozen=True):
+    """Find the leg, verify, go home, massage every station, go home."""
+
+
+class Capture(Job, frozen=True):
+    """Take a picture."""
+
+
+class Calibrate(Job, frozen=True):
+    """Find the leg in the last picture, or in a new one."""
+
+
+class Verify(Job, frozen=True):
+    """Decide whether the calibration may be used."""
+
+
+class Home(Job, frozen=True):
+    """Go to the parked pose."""
+
+
+class Massage(Job, frozen=True):
+    """Massage every station with the verified calibration."""
+
+
+class Pause(Struct, frozen=True, forbid_unknown_fields=True):
+    """Retract at the next safe point and hold."""
+
+
+class Resume(Struct, frozen=True, forbid_unknown_fields=True):
+    """Go on with the stroke that was broken off."""
+
+
+class Stop(Struct, frozen=True, forbid_unknown_fields=True):
+    """Finish the current short motion, retract, end the job as stopped."""
+
+
+class Estop(Struct, frozen=True, forbid_unknown_fields=True):
+    """Send no further motion command; fault. Never refused."""
+
+
+class Reset(Struct, frozen=True, forbid_unknown_fields=True):
+    """Leave fault once arm and camera answer."""
+
+
+class Reference(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Say at which pose the arm stands now; the configured start pose by default."""
+
+    xyz_mm: Point | None = None
+    pitch_deg: float | None = None
+    roll_deg: float | None = None
+
+
+class Wait(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Answer when a session has ended or the time is up (outcome null)."""
+
+    session: Name
+    timeout_s: Annotated[float, Meta(ge=0, le=86400)] = 60.0
+
+
+class Sessions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """List the latest sessions, newest first."""
+
+    limit: Annotated[int, Meta(ge=1, le=200)] = 20
+
+
+class Session(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Return one session: job, times, outcome, reason."""
+
+    session: Name
+
+
+class EventsSince(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Replay the events after `seq` of a boot, oldest first, as far as they are still kept."""
+
+    boot: Name
+    seq: Annotated[int, Meta(ge=0)]
+    limit: Annotated[int, Meta(ge=1, le=1000)] = 500
+
+
+class Shutdown(Struct, frozen=True, forbid_unknown_fields=True):
+    """Stop what runs, let go of the devices, end the daemon."""
+
+
+Request = (
+    Ping | Status | Describe | Wait | Sessions | Session | EventsSince | Shutdown | Job
+    | Pause | Resume | Stop | Estop | Reset | Reference
+)  # fmt: skip
+
+REQUESTS: Final[dict[str, type[Struct]]] = {
+    "ping": Ping,
+    "status": Status,
+    "describe": Describe,
+    "run": Run,
+    "capture": Capture,
+    "calibrate": Calibrate,
+    "verify": Verify,
+    "home": Home,
+    "massage": Massage,
+    "pause": Pause,
+    "resume": Resume,
+    "stop": Stop,
+    "estop": Estop,
+    "reset": Reset,
+    "reference": Reference,
+    "wait": Wait,
+    "sessions": Sessions,
+    "session": Session,
+    "events_since": EventsSince,
+    "shutdown": Shutdown,
+}
+
+
+def describe_methods() -> dict[str, dict[str, Any]]:
+    """Return each method's sentence and the JSON Schema of its parameters."""
+    return {
+        name: {"does": _first_line(kind), "params": msgspec.json.schema(kind)}
+        for name, kind in REQUESTS.items()
+    }
+
+
+def _first_line(kind: type[Struct]) -> str:
+    return (kind.__doc__ or "").partition("\n")[0]
