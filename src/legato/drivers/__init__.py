@@ -1,0 +1,1 @@
+"""Arms and cameras, real and simulated; strangers to each other."""

@@ -1,0 +1,1 @@
+"""The simulated cell: one world shared by its arm and its camera."""
