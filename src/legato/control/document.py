@@ -1,0 +1,107 @@
+"""A calibration as the JSON document of `legato solve` and of a record's calibration.json."""
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from legato.calibration.problem import GENES
+from legato.control.perceive import Calibration
+from legato.control.settings import CellSettings
+from legato.control.verify import Check, picture_checks
+from legato.geometry.transforms import Array
+
+NOT_SEPARABLE = "f, s_x and s_y are not separately observable: only alpha_u and alpha_v are"
+
+
+def document(
+    calibration: Calibration, settings: CellSettings, checks: Iterable[Check] | None = None
+) -> dict[str, Any]:
+    """Return the document; without `checks` those that the picture alone can answer are made."""
+    checks = picture_checks(calibration, settings) if checks is None else list(checks)
+    solution, problem = calibration.solution, calibration.problem
+    camera = solution.intrinsics
+    return {
+        "accepted": all(c.ok for c in checks),
+        "reasons": [c.text for c in checks if not c.ok],
+        "engine": solution.engine,
+        "intrinsics": "free" if problem.known is None else "known",
+        "marks": _named(calibration, problem.pixels),
+        "missing": dict(calibration.picking.missing),
+        "residuals": _named(calibration, solution.residuals),
+        "rms_px": solution.rms_px,
+        "camera_from_object": solution.camera_from_object.tolist(),
+        "world_from_object": calibration.world_from_object.tolist(),
+        "world_from_camera": settings.world_from_camera.tolist(),
+        "alpha_u": camera.alpha_u,
+        "alpha_v": camera.alpha_v,
+        "u0": camera.u0,
+        "v0": camera.v0,
+        "k1": camera.k1,
+        "k2": camera.k2,
+        "width": settings.nominal.width,
+        "height": settings.nominal.height,
+        "parameters": _parameters(calibration),
+        "sigma": {
+            "rotation_deg": float(np.degrees(solution.sigma_rotation)),
+            "translation_mm": solution.sigma_translation,
+            "stations_mm": solution.sigma_stations.tolist(),
+        },
+        "agreement": solution.agreement,
+        "held_out": [asdict(h) for h in calibration.held_out],
+        "suspects": list(calibration.suspects.names),
+        "warnings": [*calibration.degeneracy.warnings, NOT_SEPARABLE],
+        "trace": {"best": list(solution.trace.best), "mean": list(solution.trace.mean)},
+        "generations": solution.generations,
+        "stopped_by": solution.stopped_by,
+        "checks": [asdict(c) for c in checks],
+        "stations": _stations(calibration, settings),
+        "leg": {
+            "big_radius_mm": settings.leg.big_radius,
+            "small_radius_mm": settings.leg.small_radius,
+            "length_mm": settings.leg.length,
+            "marks": {n: list(p) for n, p in settings.leg.marks.items()},
+        },
+    }
+
+
+def _named(calibration: Calibration, values: Array) -> dict[str, list[float]]:
+    pairs = zip(calibration.problem.names, values, strict=True)
+    return {name: [float(v) for v in value] for name, value in pairs}
+
+
+def _parameters(calibration: Calibration) -> list[dict[str, Any]]:
+    """Return the 11 genes with bounds; a standard deviation where one can be told."""
+    solution, problem = calibration.solution, calibration.problem
+    sigma = dict(zip(("u0", "v0"), np.sqrt(np.diag(solution.covariance)[2:4]), strict=True))
+    sigma |= dict(
+        zip(("t_x", "t_y", "t_z"), np.sqrt(np.diag(solution.covariance)[7:]), strict=True)
+    )
+    pose = GENES[5:]
+    return [
+        {
+            "name": gene,
+            "value": float(value),
+            "low": problem.bounds[gene][0],
+            "high": problem.bounds[gene][1],
+            "sigma": float(sigma[gene]) if gene in sigma else None,
+            "on_bound": gene in solution.on_bound,
+            "searched": problem.known is None or gene in pose,
+        }
+        for gene, value in zip(GENES, solution.genes, strict=True)
+    ]
+
+
+def _stations(calibration: Calibration, settings: CellSettings) -> list[dict[str, Any]]:
+    rows = zip(
+        settings.stations,
+        calibration.stations,
+        calibration.normals,
+        calibration.solution.sigma_stations,
+        strict=True,
+    )
+    return [
+        {"station_mm": s, "place_mm": p.tolist(), "normal": n.tolist(), "sigma_mm": float(e)}
+        for s, p, n, e in rows
+    ]

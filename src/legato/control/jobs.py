@@ -1,0 +1,140 @@
+"""The jobs that a request starts, each a generator of effects that reads from top to bottom.
+
+A job returns its outcome, `done` or `stopped`; it raises Refused or CellFault otherwise.
+"""
+
+from collections.abc import Generator
+from typing import Any
+
+from legato.control.document import document
+from legato.control.effects import Effect, Enter, Find, Grab, Refused, Save, Solve, StopRequested
+from legato.control.massage import in_state, passes
+from legato.control.memory import Memory
+from legato.control.motion import Procedure, Track
+from legato.control.perceive import Calibration
+from legato.control.settings import CellSettings
+from legato.control.states import CALIBRATE, CAPTURE, MOVE_HOME, STOPPING, VERIFY
+from legato.control.strokes import Job
+from legato.control.table import PRECONDITION, Refusal
+from legato.control.verify import Check, cell_checks, picture_checks, second_picture_check
+from legato.hal.faults import Cause
+
+CALIBRATION_FILE = "calibration.json"
+
+
+def procedure(
+    job: str, settings: CellSettings, memory: Memory, now: float
+) -> Generator[Effect, Any, str]:
+    """Return the job's generator; `now` (monotonic s) dates a verified calibration."""
+    track = Track(settings, memory)
+    return _stoppable(track, _work(job, settings, memory, track, now))
+
+
+def precondition(job: str, settings: CellSettings, memory: Memory, now: float) -> Refusal | None:
+    """Return what a job needs and has not got, or None."""
+    if job in ("run", "home", "massage") and memory.steps() is None:
+        hint = "bring the arm to a known pose and send reference with that pose"
+        return Refusal(PRECONDITION, "the arm is not referenced", hint)
+    if job == "calibrate" and memory.frame is None:
+        return Refusal(PRECONDITION, "there is no picture to calibrate from", "send capture first")
+    if job == "verify" and memory.calibration is None:
+        return Refusal(PRECONDITION, "there is no calibration to verify", "send calibrate first")
+    if job == "massage":
+        return _massage_precondition(settings, memory, now)
+    return None
+
+
+def _massage_precondition(settings: CellSettings, memory: Memory, now: float) -> Refusal | None:
+    if memory.calibration is None or memory.verified_at is None:
+        hint = "send capture, calibrate and verify first, or run"
+        return Refusal(PRECONDITION, "there is no verified calibration", hint)
+    age, fresh = now - memory.verified_at, settings.calibration.fresh_s
+    if age > fresh:
+        reason = f"the verified calibration is {age:.0f} s old, {fresh:.0f} s are allowed"
+        return Refusal(PRECONDITION, reason, "send capture, calibrate and verify again")
+    return None
+
+
+def _stoppable(track: Track, work: Procedure) -> Generator[Effect, Any, str]:
+    """Carry out a job; on a stop retract where the fingertip is at the leg, and end as stopped."""
+    try:
+        yield from work
+    except StopRequested:
+        yield Enter(STOPPING)
+        yield from track.retreat()
+        return "stopped"
+    return "done"
+
+
+def _work(job: str, settings: CellSettings, memory: Memory, track: Track, now: float) -> Procedure:
+    """Return the generator of one job's own part."""
+    match job:
+        case "run":
+            return _run(settings, memory, track, now)
+        case "capture":
+            return _capture(memory)
+        case "calibrate":
+            return _calibrate(settings, memory)
+        case "verify":
+            return _verify(settings, memory, now)
+        case "home":
+            return _home(settings, track)
+        case "massage":
+            return _massage(settings, memory, track)
+    raise ValueError(f"there is no job {job}")
+
+
+def _run(settings: CellSettings, memory: Memory, track: Track, now: float) -> Procedure:
+    yield from _capture(memory)
+    yield from _calibrate(settings, memory)
+    yield from _verify(settings, memory, now)
+    yield from _home(settings, track)
+    yield from _massage(settings, memory, track)
+    yield from _home(settings, track)
+
+
+def _capture(memory: Memory) -> Procedure:
+    yield Enter(CAPTURE)
+    memory.frame = None
+    memory.frame = yield Grab("capture")
+
+
+def _calibrate(settings: CellSettings, memory: Memory) -> Procedure:
+    yield Enter(CALIBRATE)
+    memory.calibration = memory.verified_at = None
+    calibration: Calibration = yield Solve(memory.frame)  # type: ignore[arg-type] # precondition
+    memory.calibration = calibration
+    yield Save(CALIBRATION_FILE, document(calibration, settings))
+
+
+def _verify(settings: CellSettings, memory: Memory, now: float) -> Procedure:
+    """Hold the calibration to every test; Refused with each reason where one fails."""
+    yield Enter(VERIFY)
+    memory.verified_at = None
+    calibration = memory.calibration
+    assert calibration is not None, "precondition of verify"
+    second = yield Find((yield Grab("verify")))
+    checks: list[Check] = [
+        *picture_checks(calibration, settings),
+        second_picture_check(calibration, second, settings),
+        *cell_checks(calibration, settings),
+    ]
+    yield Save(CALIBRATION_FILE, document(calibration, settings, checks))
+    failed = tuple(c.text for c in checks if not c.ok)
+    if failed:
+        memory.calibration = None
+        raise Refused(Cause.CALIBRATION_REJECTED, failed)
+    memory.verified_at = now
+
+
+def _home(settings: CellSettings, track: Track) -> Procedure:
+    def work() -> Procedure:
+        yield from track.read()
+        yield from track.travel(settings.home)
+
+    yield from in_state(track, MOVE_HOME, work)
+
+
+def _massage(settings: CellSettings, memory: Memory, track: Track) -> Procedure:
+    assert memory.calibration is not None, "precondition of massage"
+    yield from passes(Job(settings, memory.calibration, track))
