@@ -1,0 +1,37 @@
+"""Session ids: the time in UTC and a token, such as 20261122T014700Z-5f3a; they sort by time."""
+
+import re
+from datetime import UTC, datetime
+
+from legato.records.errors import RecordError
+
+SESSION_ID = re.compile(r"\d{8}T\d{6}Z-[0-9a-z]{1,32}", re.ASCII)
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", re.ASCII)
+
+
+def session_id(started: str, token: str) -> str:
+    """Return the id of a session begun at an ISO time; a time without a zone is UTC."""
+    time = moment(started).strftime("%Y%m%dT%H%M%SZ")
+    return checked_id(f"{time}-{token}")
+
+
+def moment(iso: str) -> datetime:
+    """Return an ISO time in UTC; raises ValueError."""
+    time = datetime.fromisoformat(iso)
+    return time.astimezone(UTC) if time.tzinfo else time.replace(tzinfo=UTC)
+
+
+def checked_id(text: str) -> str:
+    """Return `text` where it is a session id; no path gets through here."""
+    if not SESSION_ID.fullmatch(text):
+        raise RecordError(
+            f"{text!r} is no session id", "ids look like 20261122T014700Z-5f3a: `legato sessions`"
+        )
+    return text
+
+
+def checked_name(text: str) -> str:
+    """Return `text` where it may name a picture or document of a session."""
+    if not NAME.fullmatch(text):
+        raise ValueError(f"{text!r} names no part of a record: letters, digits, - and _ only")
+    return text

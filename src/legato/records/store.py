@@ -1,0 +1,245 @@
+"""The folder of all sessions and the daemon's own state, under `records.state_dir`.
+
+One process writes. A session's folder appears whole, with its session.json, or not at all.
+"""
+
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from errno import EEXIST, ENOTEMPTY
+from pathlib import Path
+from typing import Any
+
+from legato.records.chain import EVENTS, SESSION, read_events, seal_of, split_lines
+from legato.records.errors import RecordError, told
+from legato.records.files import (
+    encode,
+    make_folder,
+    read_bytes,
+    read_object,
+    remove_folder,
+    replace_file,
+    sync_folder,
+)
+from legato.records.ids import SESSION_ID, checked_id, moment, session_id
+from legato.records.record import SessionRecord, read_session
+from legato.records.session import FRAMES, SessionWriter
+
+BEGUN = ".begun-"
+PRUNED = ".pruned-"
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One line of a list of sessions; times are ISO text, `outcome` is None until it has one."""
+
+    id: str
+    job: str
+    started: str
+    ended: str | None
+    outcome: str | None
+    reason: str | None
+    cause: str | None
+    simulated: bool
+    key: str | None = None
+
+
+class Store:
+    """The records under one folder; `token` gives the part of an id that keeps it unique."""
+
+    def __init__(
+        self, state_dir: Path, *, token: Callable[[], str] = lambda: secrets.token_hex(2)
+    ) -> None:
+        self.state_dir = state_dir
+        self.folder = state_dir / "sessions"
+        self._token = token
+
+    def begin(self, meta: Mapping[str, Any]) -> SessionWriter:
+        """Begin a session's record; `meta` is session.json's content, with `started` in ISO.
+
+        Raises RecordError where the disk does not take it: then there is no session.
+        """
+        make_folder(self.folder)
+        for _ in range(64):
+            name = session_id(str(meta["started"]), self._token())
+            whole = {"id": name} | dict(meta) | {"id": name}
+            whole |= {"ended": None, "outcome": None, "reason": None, "cause": None}
+            if self._place(name, whole):
+                return SessionWriter(self.folder / name, whole)
+        raise RecordError(f"{self.folder} has no free id left", "begin again in a second")
+
+    def _place(self, name: str, meta: Mapping[str, Any]) -> bool:
+        """Put a new session's folder in place as a whole; False where the id is taken."""
+        fresh, final = self.folder / f"{BEGUN}{name}", self.folder / name
+        if fresh.exists():
+            remove_folder(fresh)
+        make_folder(fresh)
+        make_folder(fresh / FRAMES)
+        with told("begin a session in", self.folder):
+            try:
+                (fresh / EVENTS).touch(mode=0o640)
+                replace_file(fresh / SESSION, encode(meta) + b"\n")
+                fresh.rename(final)
+            except OSError as error:
+                if error.errno not in (EEXIST, ENOTEMPTY):
+                    raise
+                remove_folder(fresh)
+                return False
+            sync_folder(self.folder)
+        return True
+
+    def read(self, session: str) -> SessionRecord:
+        """Return one session's record; raises RecordError where there is none."""
+        return read_session(self._path(session))
+
+    def sessions(self) -> list[Summary]:
+        """Return every session, newest first."""
+        found = [self._summary(path) for path in self._paths()]
+        return sorted(found, key=lambda s: (s.started, s.id), reverse=True)
+
+    def unfinished(self) -> list[str]:
+        """Return the ids of sessions without an outcome, oldest first."""
+        return [s.id for s in reversed(self.sessions()) if s.outcome is None]
+
+    def close_interrupted(self, session: str, ended: str | None = None) -> None:
+        """Give a session that has none the outcome `interrupted`; its lines stay untouched.
+
+        It ended at `ended`, or when its last event was written, as far as anybody knows.
+        """
+        path = self._path(session)
+        meta = self._meta_or_rest(path)
+        if meta.get("outcome") is not None:
+            return
+        events, torn = read_events(path)
+        last = str(events[-1].get("wall")) if events else str(meta.get("started"))
+        reason = "the daemon ended before the session did"
+        if torn:
+            reason += f"; its record is torn after event {len(events)}"
+        meta |= {
+            "ended": ended or last,
+            "outcome": "interrupted",
+            "reason": reason,
+            "cause": "interrupted",
+            "seal": _seal(path),
+        }
+        replace_file(path / SESSION, encode(meta) + b"\n")
+
+    def prune(self, keep_days: float, now: datetime) -> list[str]:
+        """Remove sessions that ended more than `keep_days` before `now`; return their ids.
+
+        A session without an outcome stays whatever its age.
+        """
+        self._sweep()
+        removed = []
+        for summary in reversed(self.sessions()):
+            if summary.outcome is None or not _older(summary, now - timedelta(days=keep_days)):
+                continue
+            path = self.folder / summary.id
+            gone = self.folder / f"{PRUNED}{summary.id}"
+            with told("remove", path):
+                path.rename(gone)
+            remove_folder(gone)
+            removed.append(summary.id)
+        return removed
+
+    def load_state(self) -> dict[str, Any]:
+        """Return what `save_state` kept last, empty where it never did."""
+        try:
+            return read_object(self.state_dir / "state.json")
+        except FileNotFoundError:
+            return {}
+
+    def save_state(self, state: Mapping[str, Any]) -> None:
+        """Keep the daemon's own state, replacing the last as a whole."""
+        make_folder(self.state_dir)
+        replace_file(self.state_dir / "state.json", encode(state) + b"\n")
+
+    def free_mb(self) -> float:
+        """Return the megabytes that may still be written under the state folder."""
+        place = self.state_dir
+        while not place.exists() and place != place.parent:
+            place = place.parent
+        with told("look at", place):
+            return shutil.disk_usage(place).free / 1e6
+
+    def _path(self, session: str) -> Path:
+        """Return the folder of a session that is there."""
+        path = self.folder / checked_id(session)
+        if path.is_symlink() or not path.is_dir():
+            raise RecordError(f"there is no session {session}", "`legato sessions` lists them")
+        return path
+
+    def _paths(self) -> Iterator[Path]:
+        """Yield the folders of all sessions; links and foreign names are none."""
+        with told("read", self.folder):
+            try:
+                entries = list(os.scandir(self.folder))
+            except FileNotFoundError:
+                return
+        for entry in entries:
+            if SESSION_ID.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False):
+                yield Path(entry.path)
+
+    def _summary(self, path: Path) -> Summary:
+        """Return one session's line; a damaged session.json leaves it without an outcome."""
+        meta = {"reason": "session.json is damaged", **_stand_in(path)}
+        with suppress(RecordError, FileNotFoundError):
+            meta = read_object(path / SESSION)
+        return Summary(
+            id=path.name,
+            job=str(meta.get("job", "unknown")),
+            started=str(meta.get("started", "")),
+            ended=meta.get("ended"),
+            outcome=meta.get("outcome"),
+            reason=meta.get("reason"),
+            cause=meta.get("cause"),
+            simulated=bool(meta.get("simulated", False)),
+            key=meta.get("key"),
+        )
+
+    def _meta_or_rest(self, path: Path) -> dict[str, Any]:
+        """Return session.json; where it is damaged it is put aside and a stand-in returned."""
+        try:
+            return read_object(path / SESSION)
+        except FileNotFoundError:
+            return _stand_in(path)
+        except RecordError:
+            with told("move", path / SESSION):
+                (path / SESSION).rename(path / "session.damaged")
+            return _stand_in(path)
+
+    def _sweep(self) -> None:
+        """Remove what an interrupted begin or prune left."""
+        if not self.folder.is_dir():
+            return
+        with told("read", self.folder):
+            entries = list(os.scandir(self.folder))
+        for entry in entries:
+            left = entry.name.startswith((BEGUN, PRUNED))
+            if left and entry.is_dir(follow_symlinks=False):
+                remove_folder(Path(entry.path))
+
+
+def _stand_in(path: Path) -> dict[str, Any]:
+    """Return what a session's name alone tells."""
+    started = datetime.strptime(path.name.partition("-")[0], "%Y%m%dT%H%M%S%z")
+    return {"id": path.name, "job": "unknown", "started": started.isoformat()}
+
+
+def _seal(path: Path) -> dict[str, Any]:
+    """Return the seal of the lines that are there."""
+    try:
+        return seal_of(*split_lines(read_bytes(path / EVENTS)))
+    except FileNotFoundError:
+        return seal_of([])
+
+
+def _older(summary: Summary, limit: datetime) -> bool:
+    """Say whether a session ended before `limit`; one whose time cannot be read did not."""
+    with suppress(ValueError):
+        return moment(summary.ended or summary.started) < limit
+    return False
