@@ -1,0 +1,232 @@
+"""What must hold between the configuration's keys before anything opens; first breach raises.
+
+Types and single ranges are the schema's business; here stand the checks across keys.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from legato.config.build import arm_model, leg
+from legato.config.endpoints import check_endpoint
+from legato.config.errors import ABSENT, ConfigError
+from legato.config.schema import Config, Point, PoseTable, ServerTable
+from legato.control.states import massage_state
+from legato.geometry.arm import Unreachable, reach
+from legato.geometry.transforms import (
+    NotARotation,
+    checked_transform,
+    look_at,
+    nearest_rotation,
+)
+
+MARK_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,15}")
+FEWEST_MARKS = 7
+FEWEST_USED = 6  # with a known camera; the calibration asks for more where it is free
+SURFACE_MM = 0.5
+
+
+def check(config: Config, file: Path) -> None:
+    """Raise ConfigError for the first thing that does not fit together in `config`."""
+    check_server(config.server, file)
+    _check_camera_pose(config, file)
+    _check_ranges(config, file)
+    _check_leg(config, file)
+    _check_marks(config, file)
+    _check_calibration(config, file)
+    _check_arm(config, file)
+    _check_sim(config, file)
+
+
+def check_server(server: ServerTable, file: Path) -> None:
+    """Raise ConfigError unless every endpoint is on loopback and no two are the same."""
+    endpoints = {"requests": server.requests, "events": server.events, "stop": server.stop}
+    seen: dict[str, str] = {}
+    for name, endpoint in endpoints.items():
+        check_endpoint(file, f"server.{name}", endpoint)
+        if endpoint in seen and not endpoint.endswith(":*"):
+            expected = f"another endpoint than server.{seen[endpoint]}'s"
+            raise ConfigError(file, f"server.{name}", endpoint, expected)
+        seen[endpoint] = name
+
+
+def _check_camera_pose(config: Config, file: Path) -> None:
+    """Raise ConfigError unless the camera's pose is given once and is a rigid transform."""
+    cell = config.cell
+    looks = {"camera_at_mm": cell.camera_at_mm, "camera_looks_at_mm": cell.camera_looks_at_mm}
+    if cell.world_from_camera is not None:
+        for name, value in looks.items():
+            if value is not None:
+                expected = "nothing, since cell.world_from_camera is given: one of the two"
+                raise ConfigError(file, f"cell.{name}", list(value), expected)
+        _check_transform("cell.world_from_camera", cell.world_from_camera, file)
+        return
+    if cell.camera_at_mm is None or cell.camera_looks_at_mm is None:
+        name = next(name for name, value in looks.items() if value is None)
+        expected = "camera_at_mm with camera_looks_at_mm, or world_from_camera"
+        raise ConfigError(file, f"cell.{name}", ABSENT, expected)
+    key = "cell.camera_looks_at_mm"
+    _check_aim(key, cell.camera_at_mm, cell.camera_looks_at_mm, file)
+
+
+def _check_transform(key: str, matrix: Any, file: Path) -> None:
+    """Raise ConfigError unless `matrix` is a rigid transform; the hint prints the nearest one."""
+    try:
+        checked_transform(matrix)
+    except NotARotation as error:
+        expected = (
+            "a rotation, determinant 1 and R^T R = I within 1e-6, "
+            f"not determinant {error.determinant:.4f} and error {error.error:.2e}"
+        )
+        nearest = np.array(matrix, dtype=float)
+        nearest[:3, :3] = nearest_rotation(nearest[:3, :3])
+        rows = ", ".join(f"[{', '.join(f'{v:.9f}' for v in row)}]" for row in nearest)
+        hint = f"measure again, or if it is rounding only, the nearest is [{rows}]"
+        raise ConfigError(file, key, _rows(matrix), expected, hint) from error
+    except ValueError as error:
+        raise ConfigError(file, key, _rows(matrix), str(error)) from error
+
+
+def _rows(matrix: Any) -> list[list[float]]:
+    """Return a matrix as lists, as it stands in the file."""
+    return [list(row) for row in matrix]
+
+
+def _ranges(config: Config) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Yield every key that holds a low and a high value."""
+    for name in config.calibration.bounds.__struct_fields__:
+        yield f"calibration.bounds.{name}", getattr(config.calibration.bounds, name)
+    for name in ("base_deg", "shoulder_deg", "elbow_deg", "wrist_deg", "roll_deg"):
+        yield f"robot.{name}", getattr(config.robot, name)
+    for name in ("x_mm", "y_mm", "z_mm"):
+        yield f"cell.workspace.{name}", getattr(config.cell.workspace, name)
+
+
+def _check_ranges(config: Config, file: Path) -> None:
+    """Raise ConfigError where a range's low end is not below its high end, or has no meaning."""
+    for key, (low, high) in _ranges(config):
+        if not low < high:
+            raise ConfigError(file, key, [low, high], "a low value and then a higher one")
+    bounds = config.calibration.bounds
+    for name in ("f", "s_x", "s_y"):
+        low, high = getattr(bounds, name)
+        if low <= 0:
+            key = f"calibration.bounds.{name}"
+            raise ConfigError(file, key, [low, high], "a range above 0")
+    if bounds.t_z[0] < 0:
+        expected = "a range from 0 up: the leg is in front of the camera"
+        raise ConfigError(file, "calibration.bounds.t_z", list(bounds.t_z), expected)
+
+
+def _check_leg(config: Config, file: Path) -> None:
+    """Raise ConfigError unless the leg tapers and its stations lie on it, in order."""
+    table = config.leg
+    if not table.small_radius_mm < table.big_radius_mm:
+        expected = f"less than leg.big_radius_mm, {table.big_radius_mm:g}"
+        raise ConfigError(file, "leg.small_radius_mm", table.small_radius_mm, expected)
+    stations = list(table.stations_mm)
+    for index, station in enumerate(stations):
+        if not 0 <= station <= table.length_mm:
+            expected = f"a place on the leg, 0 to leg.length_mm = {table.length_mm:g} mm"
+            raise ConfigError(file, f"leg.stations_mm[{index}]", station, expected)
+    if any(a >= b for a, b in pairwise(stations)):
+        raise ConfigError(file, "leg.stations_mm", stations, "distinct places in rising order")
+    names = Counter(massage_state(s) for s in stations)
+    for name, count in names.items():
+        if count > 1:
+            expected = f"places far enough apart to have a state each, not {count} {name}"
+            raise ConfigError(file, "leg.stations_mm", stations, expected)
+    if not config.massage.contact_window_mm < table.approach_mm:
+        expected = f"less than leg.approach_mm, {table.approach_mm:g}"
+        value = config.massage.contact_window_mm
+        raise ConfigError(file, "massage.contact_window_mm", value, expected)
+
+
+def _check_marks(config: Config, file: Path) -> None:
+    """Raise ConfigError unless enough marks with fit names lie on the leg's surface."""
+    marks = config.leg.marks
+    if len(marks) < FEWEST_MARKS:
+        expected = f"at least {FEWEST_MARKS} marks"
+        raise ConfigError(file, "leg.marks", f"{len(marks)} marks", expected)
+    for name in marks:
+        if not MARK_NAME.fullmatch(name):
+            expected = "a mark's name: a letter, then letters, digits or _, 16 at most"
+            raise ConfigError(file, f"leg.marks.{name}", name, expected)
+    shape = leg(config)
+    for name, clearance in zip(marks, shape.clearance(shape.points()), strict=True):
+        if abs(clearance) > SURFACE_MM:
+            expected = f"a place on the leg's surface to {SURFACE_MM} mm, not {clearance:+.2f} mm"
+            hint = "measured outward from radii and length in [leg]"
+            raise ConfigError(file, f"leg.marks.{name}", list(marks[name]), expected, hint)
+
+
+def _check_calibration(config: Config, file: Path) -> None:
+    """Raise ConfigError for marks that are not there and for intrinsics that nobody gives."""
+    used = config.calibration.marks
+    for index, name in enumerate(used):
+        if name not in config.leg.marks:
+            expected = f"one of leg.marks: {', '.join(config.leg.marks)}"
+            raise ConfigError(file, f"calibration.marks[{index}]", name, expected)
+    if len(set(used)) < len(used):
+        raise ConfigError(file, "calibration.marks", list(used), "each mark once")
+    if used and len(used) < FEWEST_USED:
+        expected = f"at least {FEWEST_USED} marks, or none for all"
+        raise ConfigError(file, "calibration.marks", list(used), expected)
+    if config.calibration.intrinsics == "known" and config.camera.intrinsics is None:
+        hint = 'make one with `legato intrinsics`, or set calibration.intrinsics = "free"'
+        expected = 'an intrinsics file, since calibration.intrinsics = "known"'
+        raise ConfigError(file, "camera.intrinsics", ABSENT, expected, hint)
+
+
+def _check_arm(config: Config, file: Path) -> None:
+    """Raise ConfigError unless the arm can stand at its start pose and at home."""
+    robot = config.robot
+    if not robot.finger_length_mm < robot.hand_mm:
+        expected = f"less than robot.hand_mm, {robot.hand_mm:g}"
+        raise ConfigError(file, "robot.finger_length_mm", robot.finger_length_mm, expected)
+    box = config.cell.workspace
+    for axis, place, limits in zip(
+        "xyz", robot.home.xyz_mm, (box.x_mm, box.y_mm, box.z_mm), strict=True
+    ):
+        if not limits[0] <= place <= limits[1]:
+            expected = f"{axis} inside cell.workspace, {limits[0]:g} to {limits[1]:g} mm"
+            raise ConfigError(file, "robot.home.xyz_mm", list(robot.home.xyz_mm), expected)
+    if robot.home.xyz_mm[2] <= config.cell.table_z_mm:
+        expected = f"a place above the table, cell.table_z_mm = {config.cell.table_z_mm:g}"
+        raise ConfigError(file, "robot.home.xyz_mm", list(robot.home.xyz_mm), expected)
+    _check_reach(config, "robot.home", robot.home, file)
+    _check_reach(config, "robot.start", robot.start, file)
+
+
+def _check_sim(config: Config, file: Path) -> None:
+    """Raise ConfigError for a simulated arm or camera that cannot stand where it truly is."""
+    sim = config.sim
+    truth = PoseTable(xyz_mm=sim.arm_at_mm, pitch_deg=sim.arm_pitch_deg, roll_deg=sim.arm_roll_deg)
+    if config.robot.driver == "sim":
+        _check_reach(config, "sim.arm_at_mm", truth, file)
+    if config.camera.driver == "sim":
+        _check_aim("sim.camera_looks_at_mm", sim.camera_at_mm, sim.camera_looks_at_mm, file)
+
+
+def _check_aim(key: str, eye: Point, target: Point, file: Path) -> None:
+    """Raise ConfigError where a camera at `eye` cannot be aimed at `target` with its x level."""
+    try:
+        look_at(eye, target)
+    except ValueError as error:
+        expected = f"a place that the camera can look at: {error}"
+        raise ConfigError(file, key, list(target), expected) from error
+
+
+def _check_reach(config: Config, key: str, pose: PoseTable, file: Path) -> None:
+    """Raise ConfigError where the arm cannot take a pose within its limits."""
+    pitch, roll = np.radians([pose.pitch_deg, pose.roll_deg])
+    try:
+        reach(arm_model(config), pose.xyz_mm, float(pitch), float(roll))
+    except Unreachable as error:
+        expected = f"a pose within the arm's reach and limits: {error}"
+        raise ConfigError(file, key, list(pose.xyz_mm), expected) from error
