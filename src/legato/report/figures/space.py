@@ -1,0 +1,116 @@
+"""The fingertip's way in the robot base frame, from above and from the side (paper figure 5.4a)."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from legato.geometry.transforms import Array, apply
+from legato.report.figures.canvas import (
+    FAINT,
+    GREEN,
+    INK,
+    NORMAL,
+    RED,
+    SMALL,
+    SOFT,
+    WHY_COLOURS,
+    dressed,
+    limits,
+    sheet,
+    svg,
+)
+from legato.report.figures.picture import runs
+from legato.report.scene import Scene, silhouette, surface_samples
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+NAMES = "xyz"
+
+
+def views(
+    path: Mapping[str, Array],
+    scene: Scene | None,
+    contacts: Sequence[Mapping[str, Any]],
+    true_pose: Array | None = None,
+    table_z: float = 0.0,
+) -> str:
+    """Return both views, along and across the horizontal axis that the leg follows."""
+    along = 1 if scene is None or abs(scene.world_from_object[1, 0]) > 0.7 else 0
+    across = 1 - along
+    places = np.stack([path["x"], path["y"], path["z"]], axis=-1)
+    spans = [_span(places, scene, axis) for axis in range(3)]
+    width = spans[along][1] - spans[along][0]
+    tall = [spans[across][1] - spans[across][0], spans[2][1] - min(spans[2][0], table_z - 8.0)]
+    figure = sheet(1.85 + 7.7 * sum(tall) / width, top=0.35, bottom=0.95)
+    above, side = figure.subplots(2, 1, sharex=True, height_ratios=tall)
+    figure.subplots_adjust(hspace=0.8 * width / (7.7 * sum(tall)))
+    for axes, up in ((above, across), (side, 2)):
+        _draw(axes, (along, up), path["why"], places, scene, contacts, true_pose)
+        axes.set_aspect("equal", adjustable="box")
+        axes.set_xlim(spans[along])
+    above.set_ylim(spans[across])
+    if along == 1:  # y to the right is a view from above only where x runs down
+        above.invert_yaxis()
+    side.set_ylim(min(spans[2][0], table_z - 8.0), spans[2][1])
+    side.axhline(table_z, color=SOFT, linewidth=1.0)
+    side.annotate("table", (spans[along][0] + 3.0, table_z - 6.0), fontsize=SMALL, color=SOFT)
+    dressed(above, y=f"{NAMES[across]} (mm)", title="From above")
+    dressed(side, x=f"{NAMES[along]} (mm)", y="z (mm)", title="From the side")
+    handles, labels = above.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", ncols=5, fontsize=SMALL, frameon=False)
+    return svg(figure)
+
+
+def _span(places: Array, scene: Scene | None, axis: int) -> tuple[float, float]:
+    """Return the range that one axis shows."""
+    values = [places[:, axis]]
+    if scene is not None:
+        values.append(apply(scene.world_from_object, surface_samples(scene.leg))[:, axis])
+    return limits(np.concatenate(values), 12.0)
+
+
+def _draw(
+    axes: "Axes",
+    plane: tuple[int, int],
+    whys: Array,
+    places: Array,
+    scene: Scene | None,
+    contacts: Sequence[Mapping[str, Any]],
+    true_pose: Array | None,
+) -> None:
+    """Draw the leg, its stations, the way and the contacts in one plane of the robot's frame."""
+    if scene is not None:
+        samples = surface_samples(scene.leg)
+        outline = silhouette(apply(scene.world_from_object, samples)[:, plane])
+        axes.fill(*outline.T, color=FAINT, alpha=0.6, linewidth=0.0)
+        axes.plot(*outline.T, color=SOFT, linewidth=1.2, label="leg, estimated")
+        if true_pose is not None:
+            outline = silhouette(apply(true_pose, samples)[:, plane])
+            axes.plot(*outline.T, color=INK, linewidth=0.9, linestyle=":", label="leg, true")
+        _stations(axes, plane, scene)
+    for why, colour in WHY_COLOURS.items():
+        way = runs(whys, places[:, plane], why)
+        if np.isfinite(way).any():
+            axes.plot(*way.T, color=colour, linewidth=1.3, label=why)
+    touched = [c["xyz_mm"] for c in contacts if c.get("xyz_mm")]
+    if touched:
+        at = np.asarray(touched, dtype=float)[:, plane]
+        axes.plot(*at.T, "o", color=RED, markersize=4, markeredgecolor="white", label="contact")
+
+
+def _stations(axes: "Axes", plane: tuple[int, int], scene: Scene) -> None:
+    """Draw the stations on the top line and their places along the leg."""
+    tops = scene.leg.surface_point(np.array(scene.stations))
+    points = apply(scene.world_from_object, tops)[:, plane]
+    axes.plot(*points.T, "D", color=GREEN, markersize=4, label="station", linestyle="none")
+    for station, point in zip(scene.stations, points, strict=True):
+        axes.annotate(
+            f"{station:g} mm",
+            xy=tuple(point),
+            xytext=(5.0, -11.0),
+            textcoords="offset points",
+            fontsize=NORMAL,
+            color=GREEN,
+        )

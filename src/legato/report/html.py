@@ -1,0 +1,152 @@
+"""The report of a session: one HTML file that needs nothing else, from whatever is recorded."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from legato.records.errors import told as told_error
+from legato.records.files import make_folder, replace_file
+from legato.records.record import SessionRecord
+from legato.report import facts
+from legato.report.figures import canvas, closeups, curves, picture, space
+from legato.report.paper import PLACEMENT_ERROR_MM, POSES
+from legato.report.scene import Scene, scene_of
+from legato.report.score import score
+
+TEMPLATE = "session.html.j2"
+LAST_EVENTS = 12
+SAID = "not separately observable"  # the template says it beside the table
+
+
+def write_report(record: SessionRecord, path: Path | None = None) -> Path:
+    """Write the report of a session and return its path, by default report.html in its folder.
+
+    Raises RecordError where the file cannot be written.
+    """
+    target = path if path is not None else record.path / "report.html"
+    page = render(record)
+    make_folder(target.parent)
+    with told_error("write", target):
+        replace_file(target, page.encode())
+    return target
+
+
+def render(record: SessionRecord) -> str:
+    """Return the report as one HTML text."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("legato.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["num"] = number
+    environment.filters["told"] = facts.told
+    environment.filters["figure_text"] = significant
+    return environment.get_template(TEMPLATE).render(**content(record))
+
+
+def content(record: SessionRecord) -> dict[str, Any]:
+    """Return everything that the template shows, by name."""
+    solved, scene = record.calibration or {}, scene_of(record)
+    return {
+        "id": record.id,
+        "meta": record.meta,
+        "head": facts.headline(record),
+        "warnings": facts.warnings(record),
+        "fault": facts.fault(record),
+        "solved": solved,
+        "search": facts.search(solved),
+        "remarks": [w for w in solved.get("warnings") or () if SAID not in w],
+        "residuals": facts.residuals(solved),
+        "parameters": facts.parameters(solved),
+        "poses": POSES,
+        "contacts": facts.contacts(record),
+        "sigma": {s["station_mm"]: s.get("sigma_mm") for s in solved.get("stations") or ()},
+        "score": score(record),
+        "paper_error": PLACEMENT_ERROR_MM,
+        "stays": facts.stays(record),
+        "settings": facts.settings(record.meta.get("config") or {}),
+        "events": record.events[-LAST_EVENTS:],
+        "event_count": len(record.events),
+        "moves": int(record.trajectory["t"].size),
+        **_pictures(record, scene),
+        **_figures(record, scene),
+    }
+
+
+def _pictures(record: SessionRecord, scene: Scene | None) -> dict[str, Any]:
+    """Return the camera's picture and what is laid over it."""
+    shown: dict[str, Any] = {"picture": None, "picture_name": None, "marks": None, "scale": 1.0}
+    shown |= {"way": None, "size": None, "close": None}
+    name = facts.picture_path(record, scene)
+    if name is not None:
+        try:
+            pixels = canvas.read_picture((record.path / name).read_bytes())
+        except (OSError, ValueError, SyntaxError):  # what imread raises for a torn PNG
+            return shown
+        shown |= {"picture": canvas.jpeg(pixels), "picture_name": name, "size": pixels.shape[1::-1]}
+        fits = scene is not None and shown["size"] == (
+            scene.intrinsics.width, scene.intrinsics.height,
+        )  # fmt: skip
+        if scene is not None and fits:
+            shown["marks"], shown["scale"] = picture.marks_overlay(scene, record.calibration or {})
+            shown["close"] = closeups.marks(pixels, scene, record.calibration or {})
+            if record.trajectory["t"].size:
+                touched = facts.contacts(record)
+                shown["way"] = picture.trajectory_overlay(scene, record.trajectory, touched)
+    return shown
+
+
+def _figures(record: SessionRecord, scene: Scene | None) -> dict[str, str | None]:
+    """Return each figure as a data URI, None where there is nothing to draw."""
+    solved, touched, stays = record.calibration or {}, facts.contacts(record), facts.stays(record)
+    trace = solved.get("trace") or {}
+    config = record.meta.get("config") or {}
+    pressed = facts.profiles(record, solved)
+    true_pose = (record.truth or {}).get("world_from_object")
+    sigma = {
+        float(s["station_mm"]): float(s.get("sigma_mm") or 0.0)
+        for s in solved.get("stations") or ()
+    }
+    return {
+        "cost": curves.cost(trace["best"], trace.get("mean") or (), facts.refined_cost(solved))
+        if trace.get("best")
+        else None,
+        "space": space.views(
+            record.trajectory,
+            scene,
+            touched,
+            None if true_pose is None else np.asarray(true_pose, dtype=float),
+            float((config.get("cell") or {}).get("table_z_mm") or 0.0),
+        )
+        if record.trajectory["t"].size
+        else None,
+        "heights": curves.contact_heights(
+            touched, sigma, (config.get("massage") or {}).get("contact_window_mm")
+        )
+        if touched
+        else None,
+        "press": curves.press_profiles(pressed) if pressed else None,
+        "timeline": curves.timeline(stays) if stays else None,
+    }
+
+
+def significant(value: Any) -> str:
+    """Return a figure of any size with three significant digits."""
+    if value is None:
+        return "\N{EN DASH}"
+    return f"{float(value):.3g}".replace("-", "\N{MINUS SIGN}")
+
+
+def number(value: Any, decimals: int = 2, *, sign: bool = False) -> str:
+    """Return a number for people: a true minus, an en dash for what is not known."""
+    if value is None:
+        return "\N{EN DASH}"
+    text = f"{float(value):{'+' if sign else ''}.{decimals}f}"
+    if float(text) == 0.0:
+        text = text.lstrip("+-")
+    return text.replace("-", "\N{MINUS SIGN}")
