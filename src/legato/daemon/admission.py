@@ -1,0 +1,60 @@
+"""What a job begins with, and what it needs beyond a fitting state: devices, knowledge, room.
+
+Each check raises the Failure that the client is told.
+"""
+
+from legato.control.settings import CellSettings
+from legato.control.states import CALIBRATE, CAPTURE, MOVE_HOME, VERIFY, massage_state
+from legato.daemon.messages import View
+from legato.records.errors import RecordError
+from legato.records.store import Store
+from legato.wire.jsonrpc import Failure
+
+CAMERA_JOBS = ("run", "capture", "verify")
+ARM_JOBS = ("run", "home", "massage", "reference")
+
+
+def first_state(job: str, stations: tuple[float, ...]) -> str:
+    """Return the state that a job begins in; its procedure enters it too."""
+    return {
+        "run": CAPTURE,
+        "capture": CAPTURE,
+        "calibrate": CALIBRATE,
+        "verify": VERIFY,
+        "home": MOVE_HOME,
+        "massage": massage_state(stations[0]),
+    }[job]
+
+
+def need_devices(job: str, view: View) -> None:
+    """Raise Failure(unavailable) where the job's devices are not connected."""
+    hint = "see that it is on and plugged in; it is looked for by itself"
+    if job in ARM_JOBS and not view.arm["connected"]:
+        raise Failure("unavailable", "the arm is not connected", hint)
+    if job in CAMERA_JOBS and not view.camera_connected:
+        raise Failure("unavailable", "the camera is not connected", hint)
+
+
+def need_knowledge(job: str, view: View, settings: CellSettings, now: float) -> None:
+    """Raise Failure(precondition) where reference, picture or calibration is missing or old.
+
+    `now` is the cell's clock in s.
+    """
+    # The worker has loaded what this needs before the first job can get here.
+    from legato.control.jobs import precondition
+
+    assert view.memory is not None, "jobs wait until the devices are known"
+    no = precondition(job, settings, view.memory, now)
+    if no is not None:
+        raise Failure(no.code, no.reason, no.hint)
+
+
+def need_room(store: Store, min_free_mb: float) -> None:
+    """Raise Failure(precondition) where the disk has no room for a record."""
+    try:
+        free = store.free_mb()
+    except RecordError as error:
+        raise Failure("precondition", error.text, error.hint) from error
+    if free < min_free_mb:
+        reason = f"{free:.0f} MB are free for records, {min_free_mb:g} are needed"
+        raise Failure("precondition", reason, "free space, or see records.keep_days")

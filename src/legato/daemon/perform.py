@@ -1,0 +1,235 @@
+"""Carries out effects: the only place where a decision becomes a motion, a picture or a line.
+
+Every effect raises what it meets; the procedure is told, and the worker makes it an outcome.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable, Generator
+from typing import Any, assert_never
+
+import numpy as np
+
+from legato.control import envelope
+from legato.control.effects import (
+    CellFault,
+    Dwell,
+    Effect,
+    Enter,
+    Find,
+    Grab,
+    Hold,
+    Move,
+    ReadArm,
+    Record,
+    Save,
+    Solve,
+)
+from legato.control.jobs import CALIBRATION_FILE
+from legato.control.perceive import Calibration, find_marks_in, perceive
+from legato.control.settings import CellSettings
+from legato.daemon.devices import Devices
+from legato.daemon.messages import Happened, Message, Moved, StateWanted
+from legato.daemon.orders import Dropped, Orders
+from legato.geometry.arm import forward, joints_from_steps
+from legato.hal.arm import ArmReading
+from legato.hal.camera import Frame
+from legato.hal.faults import Cause
+from legato.records.session import SessionWriter
+from legato.records.trajectory import trajectory_row
+from legato.vision.marks import Picking
+from legato.vision.picture import encode_png
+
+NAP_S = 0.1  # cell seconds between two looks at the interrupts while dwelling
+TELEMETRY_S = 0.05  # wall seconds between two looks that a running job gives of the arm
+EFFECTS_KEPT = 8  # told as evidence
+
+
+def carry_out(
+    work: Generator[Effect, Any, str], perform: Callable[[Effect], Any], orders: Orders
+) -> str:
+    """Drive a procedure to its end and return its outcome; raises what it raises, and Dropped."""
+    try:
+        effect = next(work)
+        while True:
+            try:
+                orders.look()
+                result = perform(effect)
+            except Dropped:
+                raise
+            except Exception as error:  # noqa: BLE001  # whatever it is, the procedure is told
+                effect = work.throw(error)
+            else:
+                effect = work.send(result)
+    except StopIteration as end:
+        return str(end.value)
+    finally:
+        work.close()
+
+
+class Performer:
+    """Performs the effects of one session; `post` tells the loop."""
+
+    def __init__(
+        self,
+        devices: Devices,
+        settings: CellSettings,
+        writer: SessionWriter,
+        orders: Orders,
+        post: Callable[[Message], None],
+        wall: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.last_effects: deque[str] = deque(maxlen=EFFECTS_KEPT)
+        self.last_picture: str | None = None
+        self._devices = devices
+        self._settings = settings
+        self._writer = writer
+        self._orders = orders
+        self._post = post
+        self._wall = wall
+        self._told_at = -TELEMETRY_S
+        self._station: float | None = None
+
+    def perform(self, effect: Effect) -> Any:
+        """Carry out one effect and return its result."""
+        self.last_effects.append(_told(effect))
+        match effect:
+            case Enter(state):
+                return self._enter(state)
+            case Grab(name):
+                return self._grab(name)
+            case Find(frame):
+                return self._find(frame)
+            case Solve(frame):
+                return self._solve(frame)
+            case Move():
+                return self._move(effect)
+            case ReadArm():
+                return self._read()
+            case Dwell(seconds):
+                return self._dwell(seconds)
+            case Record(kind, data):
+                self._post(Happened(self._writer.id, kind, dict(data)))
+            case Save(name, document):
+                self._save(name, dict(document))
+            case Hold():
+                self._tell(paused=True)
+                self._orders.hold()
+            case _:
+                assert_never(effect)
+        return None
+
+    def _enter(self, state: str) -> None:
+        self._post(StateWanted(self._writer.id, state))
+        if not self._orders.entered():
+            self._orders.look()
+            raise RuntimeError(f"the procedure wanted to enter {state}, which the table forbids")
+
+    def _grab(self, name: str) -> Frame:
+        frame = self._devices.grab()
+        self.last_picture = self._writer.frame(name, encode_png(frame.image))
+        return frame
+
+    def _find(self, frame: Frame) -> Picking:
+        return find_marks_in(frame.image, self._settings, seed=self._settings.calibration.seed)
+
+    def _solve(self, frame: Frame) -> Calibration:
+        began = self._wall()
+        solved = perceive(frame.image, self._settings, seed=self._settings.calibration.seed)
+        self._devices.solved = frame, self._wall() - began
+        self._devices.calibrated_at = self._devices.cell.clock.monotonic()
+        return solved
+
+    def _move(self, move: Move) -> ArmReading:
+        """Check, send, and compare what the arm says with what it was told."""
+        memory = self._devices.memory
+        if memory.reference is None or memory.steps() != move.start:
+            text = f"a motion from {move.start} was not sent: the arm stands at {memory.steps()}"
+            raise CellFault(Cause.LIMIT, text, "reference the arm, then try again")
+        reference = memory.reference
+        leg = memory.calibration.world_from_object if memory.calibration is not None else None
+        envelope.check(self._settings, leg, move)
+        self._orders.look()
+        reading = self._devices.step(move.move)
+        self._station = move.station
+        self._row(reading, move.target, str(move.why), reference)
+        expected = tuple(t - r for t, r in zip(move.target, reference, strict=True))
+        if reading.registers != expected:
+            self._devices.doubt()
+            raise CellFault(
+                Cause.FOLLOWING_ERROR,
+                f"the arm's registers read {reading.registers}, {expected} were commanded",
+                "see what holds the arm, then reset and reference it",
+                {"commanded": list(expected), "read": list(reading.registers)},
+            )
+        self._tell(why=str(move.why))
+        return reading
+
+    def _read(self) -> ArmReading:
+        reference = self._devices.memory.reference
+        reading = self._devices.read()
+        if reference is not None and self._devices.memory.reference is None:
+            raise CellFault(
+                Cause.FOLLOWING_ERROR,
+                f"the arm's registers have changed to {reading.registers} by themselves",
+                "see who moved the arm, then reset and reference it",
+                {"read": list(reading.registers)},
+            )
+        return reading
+
+    def _dwell(self, seconds: float) -> None:
+        clock = self._devices.cell.clock
+        until = clock.monotonic() + seconds
+        while (left := until - clock.monotonic()) > 0:
+            self._orders.look()
+            clock.sleep(min(left, NAP_S))
+
+    def _save(self, name: str, document: dict[str, Any]) -> None:
+        if name == CALIBRATION_FILE and self._devices.solved is not None:
+            frame, seconds = self._devices.solved
+            # The picture may have been taken in an earlier session; each record stands alone.
+            picture = self._writer.frame("capture", encode_png(frame.image))
+            document |= {"picture": picture, "seconds": seconds}
+        self._writer.document(name, document)
+
+    def _row(
+        self, reading: ArmReading, commanded: tuple[int, ...], why: str, reference: tuple[int, ...]
+    ) -> None:
+        arm = self._settings.arm
+        read = [a + b for a, b in zip(reference, reading.registers, strict=True)]
+        joints, _ = joints_from_steps(arm, np.array(read))
+        xyz, _, _ = forward(arm, joints)
+        row = trajectory_row(
+            t=self._devices.cell.clock.monotonic(),
+            commanded=commanded,
+            read=read,
+            joints=joints.tolist(),
+            xyz=xyz.tolist(),
+            contact=reading.contact,
+            station=self._station,
+            why=why,
+        )
+        self._writer.trajectory(row)
+
+    def _tell(self, *, paused: bool = False, why: str | None = None) -> None:
+        """Give the loop a look at the arm, but not more often than people can see."""
+        now = self._wall()
+        if now - self._told_at < TELEMETRY_S and not paused:
+            return
+        self._told_at = now
+        view = self._devices.view()
+        data = {"arm": dict(view.arm), "station_mm": self._station, "why": why}
+        self._post(Moved(self._writer.id, view, data))
+
+
+def _told(effect: Effect) -> str:
+    """Return an effect as one short line of evidence; pictures and documents by name only."""
+    match effect:
+        case Save(name):
+            return f"Save({name})"
+        case Find() | Solve():
+            return type(effect).__name__
+        case Record(kind, data):
+            return f"Record({kind}, {dict(data)})"[:200]
+        case _:
+            return str(effect)[:200]

@@ -1,0 +1,139 @@
+"""The daemon's main: lock, records, sockets, worker, loop, and the way out of all of them."""
+
+import secrets
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import zmq
+
+from legato import __version__
+from legato.config.build import cell_settings
+from legato.daemon.cell import build_cell, build_clock
+from legato.daemon.conductor import Conductor
+from legato.daemon.desk import Desk
+from legato.daemon.events import Events
+from legato.daemon.journal import Journal
+from legato.daemon.lock import AlreadyRunning, only_instance
+from legato.daemon.log import Log, make_log
+from legato.daemon.loop import Loop, Sockets
+from legato.daemon.mailbox import Mailbox
+from legato.daemon.orders import Orders
+from legato.daemon.past import Past, read_past
+from legato.daemon.sessions import Sessions
+from legato.daemon.standing import Setting, Standing
+from legato.daemon.worker import Worker
+from legato.records.errors import RecordError
+from legato.records.store import Store
+
+if TYPE_CHECKING:
+    from legato.config.load import Loaded
+
+SWITCH_S = 0.0005  # Python's own thread switch: the loop answers while the worker computes
+JOIN_S = 5.0
+
+
+def serve(loaded: "Loaded", log: Log | None = None) -> int:
+    """Run the daemon until shutdown or a signal; return the process's exit code."""
+    log = log if log is not None else make_log()
+    sys.setswitchinterval(SWITCH_S)
+    state_dir = Path(loaded.config.records.state_dir)
+    try:
+        with only_instance(state_dir):
+            return _serve(loaded, Store(state_dir), log)
+    except AlreadyRunning as error:
+        log.error("already_running", text=str(error), hint="stop it first")
+    except RecordError as error:
+        log.error("records", text=error.text, hint=error.hint)
+    except zmq.ZMQError as error:
+        server = loaded.config.server
+        hint = "see what listens there, or set [server] to other ports"
+        log.error("not_bound", requests=server.requests, events=server.events, text=str(error),
+                  hint=hint)  # fmt: skip
+    except OSError as error:
+        log.error("state_dir", text=str(error), hint="make records.state_dir writable")
+    return 1
+
+
+def _serve(loaded: "Loaded", store: Store, log: Log) -> int:
+    """Run the daemon whose state folder is locked."""
+    config = loaded.config
+    settings = cell_settings(loaded)
+    boot = secrets.token_hex(8)
+    past = read_past(store, log, simulated=settings.simulated)
+    sockets = Sockets(config.server.requests, config.server.events)
+    mailbox = Mailbox()
+    try:
+        log.info("listening", version=__version__, boot=boot, **sockets.endpoints)
+        clock = build_clock(loaded)
+        orders = Orders()
+        events = Events(boot, clock.monotonic, sockets.publish)
+        setting = Setting(
+            settings=settings,
+            boot=boot,
+            clock=clock.monotonic,
+            min_free_mb=config.records.min_free_mb,
+            meta={"config_hash": loaded.hash, "config": loaded.data},
+        )
+        conductor = _conductor(setting, orders, store, past, events, log)
+        desk = Desk(conductor, events, settings, sockets.send, log)
+        keep_days = config.records.keep_days
+        worker = Worker(
+            lambda: build_cell(loaded, clock),
+            settings,
+            orders,
+            mailbox.put,
+            log,
+            last=past.last,
+            tidy=lambda: store.prune(keep_days, datetime.now(UTC)),
+        )
+        ready = partial(log.info, "ready", boot=boot, **sockets.endpoints)
+        loop = Loop(sockets, mailbox, conductor, desk, events, ready)
+        with _signals(mailbox) as ending:
+            worker.start()
+            try:
+                loop.run(lambda: bool(ending))
+            except BaseException:
+                orders.drop()  # a bug in the loop must not leave the arm moving on
+                raise
+        desk.close()
+        log.info("ended", clean=worker.join(JOIN_S))
+        return conductor.exit_code
+    finally:
+        sockets.close()
+        mailbox.close()
+
+
+def _conductor(
+    setting: Setting, orders: Orders, store: Store, past: Past, events: Events, log: Log
+) -> Conductor:
+    """Return the conductor in idle, or in the fault that the past has left."""
+    sessions = Sessions(store, past.sessions)
+    journal = Journal(sessions, events, store, setting.clock, log, past.last)
+    now = time.monotonic()
+    standing = Standing(setting, sessions, journal, log, now=now, fault=past.fault)
+    return Conductor(setting, standing, journal, orders, store, log)
+
+
+@contextmanager
+def _signals(mailbox: Mailbox) -> Iterator[list[int]]:
+    """Collect SIGTERM and SIGINT in a list, each waking the loop."""
+    came: list[int] = []
+
+    def collect(number: int, frame: Any) -> None:  # noqa: ARG001  # the signature is signal's
+        came.append(number)
+
+    before = {n: signal.signal(n, collect) for n in (signal.SIGTERM, signal.SIGINT)}
+    wake = signal.set_wakeup_fd(mailbox.wake_fileno(), warn_on_full_buffer=False)
+    try:
+        yield came
+    finally:
+        signal.set_wakeup_fd(wake)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,178 @@
+"""Where the cell stands: its state, session, fault and what is known of its devices.
+
+Every change is recorded and published here, and nowhere else. A fault is latched: its cause,
+text and time stay until `clear`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from legato.control.settings import CellSettings
+from legato.control.states import FAULT, IDLE, CellMachine, deadline
+from legato.daemon.journal import Journal
+from legato.daemon.log import Log
+from legato.daemon.messages import FaultReport, View
+from legato.daemon.sessions import Session, Sessions
+from legato.daemon.status import status_told
+from legato.hal.faults import Cause
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is given once: the cell's settings, and what every record names."""
+
+    settings: CellSettings
+    boot: str
+    clock: Callable[[], float]  # the cell's s
+    min_free_mb: float = 0.0
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Standing:
+    """The machine and what belongs to its state; `now` is the wall's monotonic s."""
+
+    def __init__(
+        self,
+        setting: Setting,
+        sessions: Sessions,
+        journal: Journal,
+        log: Log,
+        *,
+        now: float,
+        fault: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.sessions = sessions
+        self.fault = dict(fault) if fault is not None else None
+        self.view = View()
+        self.now = now
+        self.began = now
+        self._setting = setting
+        self._journal = journal
+        self._log = log
+        self._machine = CellMachine(setting.settings.stations, FAULT if fault else IDLE)
+        self._entered_at = now
+        cause = self.fault["cause"] if self.fault else "start"
+        journal.tell("state", {"state": self.state, "previous": None, "cause": cause})
+        if self.fault:
+            journal.tell("fault", self.fault | {"evidence": {}})
+
+    @property
+    def state(self) -> str:
+        """The machine's state."""
+        return self._machine.state
+
+    @property
+    def in_state_s(self) -> float:
+        """How long the state has lasted."""
+        return self.now - self._entered_at
+
+    @property
+    def due(self) -> float:
+        """When the state's deadline is; infinity where it has none."""
+        limit = deadline(self.state)
+        return float("inf") if limit is None else self._entered_at + limit
+
+    @property
+    def uptime_s(self) -> float:
+        """How long the daemon has run."""
+        return round(self.now - self.began, 3)
+
+    def status(self) -> dict[str, Any]:
+        """Return what `status` answers."""
+        told = status_told(
+            self._setting.settings,
+            self.view,
+            self.state,
+            self.sessions.current,
+            self.fault,
+            clock=self._setting.clock(),
+        )
+        return told | {"boot": self._setting.boot, "uptime_s": self.uptime_s}
+
+    def is_current(self, session: str) -> bool:
+        """Say whether a session is the one that runs."""
+        return self.sessions.current is not None and self.sessions.current.id == session
+
+    def enter(self, state: str, cause: str) -> None:
+        """Go to a state, if not there already. Raises NotAllowed."""
+        previous = self.state
+        if not self._machine.enter(state):
+            return
+        self._entered_at = self.now
+        self._log.info("state", state=state, previous=previous, cause=cause)
+        change = {"state": state, "previous": previous, "cause": cause}
+        self._journal.tell("state", change, durable=True)
+
+    def begin(self, job: str, key: str | None, versions: Mapping[str, str], state: str) -> Session:
+        """Begin a session in the job's first state. Raises RecordError: then nothing has begun."""
+        meta = dict(self._setting.meta) | {
+            "boot": self._setting.boot,
+            "simulated": self._setting.settings.simulated,
+            "versions": dict(versions),
+        }
+        session = self.sessions.begin(job, key, meta)
+        self._journal.tell("session", _told(session), durable=True)
+        self.enter(state, job)
+        return session
+
+    def happened(self, kind: str, data: Mapping[str, Any]) -> None:
+        """Take in an event of the running session."""
+        if kind == "progress" and self.sessions.current is not None:
+            self.sessions.current.progress = data
+        self._journal.tell(kind, data)
+
+    def fail(self, report: FaultReport) -> None:
+        """Latch a fault, unless one is latched already."""
+        if self.state == FAULT:
+            return
+        session = self.sessions.current
+        evidence = {"state": self.state, "arm": dict(self.view.arm), **report.evidence}
+        self.fault = {
+            "cause": str(report.cause),
+            "text": report.text,
+            "hint": report.hint,
+            "since": self.sessions.now(),
+            "session": session.id if session else None,
+        }
+        self._log.error("fault", **self.fault)
+        self.enter(FAULT, str(report.cause))
+        self._journal.tell("fault", self.fault | {"evidence": evidence}, durable=True)
+        self.keep()
+
+    def clear(self) -> None:
+        """Leave fault: the devices have answered."""
+        self.fault = None
+        self.enter(IDLE, "reset")
+
+    def end(self, outcome: str, reason: str | None, cause: Cause | None) -> str:
+        """Give the running session its outcome and return its id."""
+        current = self.sessions.current
+        assert current is not None, "only a running session ends"
+        told = _told(current) | {"outcome": outcome, "reason": reason}
+        self._journal.tell("session", told, durable=True)
+        session = self.sessions.end(outcome, reason, cause)
+        self._log.info("session", **session.told())
+        return session.id
+
+    def end_in_fault(self) -> str:
+        """Give the running session the fault as its outcome and return its id."""
+        assert self.fault is not None, "state fault always has its fault"
+        return self.end("fault", self.fault["text"], Cause(self.fault["cause"]))
+
+    def look(self, view: View) -> None:
+        """Take in what the idle worker has seen."""
+        before, self.view = self.view, view
+        if before.memory is not None and before.memory != view.memory:
+            self.keep()
+        for name in ("connected", "referenced"):
+            if before.arm[name] and not view.arm[name]:
+                self._log.warning(f"arm_not_{name}")
+
+    def keep(self) -> None:
+        """Keep on disk what the next start must know."""
+        self._journal.keep(self.fault, self.view)
+
+
+def _told(session: Session) -> dict[str, Any]:
+    return {"id": session.id, "job": session.job, "outcome": None, "reason": None}

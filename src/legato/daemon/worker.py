@@ -1,0 +1,231 @@
+"""The worker: one thread that owns the devices and performs one task after another.
+
+Whatever happens in a task, the loop gets one message that ends it. Nothing here moves the arm but
+a job's own effects.
+"""
+
+import platform
+import threading
+import time
+import traceback
+from collections.abc import Callable, Generator
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+from legato import __version__
+from legato.control.effects import CellFault, Effect, Refused, StopRequested
+from legato.control.settings import CellSettings
+from legato.daemon.cell import Cell
+from legato.daemon.log import Log
+from legato.daemon.messages import (
+    DevicesKnown,
+    FaultReport,
+    JobEnded,
+    Looked,
+    Message,
+    TaskEnded,
+    WorkerGone,
+)
+from legato.daemon.orders import DoJob, DoReference, DoReset, Dropped, Orders, Quit
+from legato.geometry.arm import Unreachable
+from legato.geometry.motion import Steps
+from legato.hal.faults import Cause, DeviceError
+from legato.records.errors import RecordError
+
+if TYPE_CHECKING:
+    from legato.control.memory import Memory
+    from legato.daemon.devices import Devices
+    from legato.daemon.perform import Performer
+
+TIDY_S = 86400.0  # between two clean-ups of old records
+LOOK_S = 1.0  # between two looks at the idle arm
+RETRIES = (2, 30)  # looks between two attempts to open what is missing, doubling
+
+Procedures = Callable[[str, CellSettings, "Memory", float], Generator[Effect, Any, str]]
+
+
+class Worker:
+    """One thread over one cell.
+
+    `last` is the reference and the registers recorded before; `tidy` removes old records.
+    """
+
+    def __init__(
+        self,
+        make_cell: Callable[[], Cell],
+        settings: CellSettings,
+        orders: Orders,
+        post: Callable[[Message], None],
+        log: Log,
+        *,
+        last: tuple[Steps | None, Steps | None] = (None, None),
+        procedures: Procedures | None = None,
+        tidy: Callable[[], object] = lambda: None,
+        look_s: float = LOOK_S,
+    ) -> None:
+        self._make_cell = make_cell
+        self._settings = settings
+        self._orders = orders
+        self._post = post
+        self._log = log
+        self._last = last
+        self._procedures = procedures
+        self._tidy = tidy
+        self._tidied_at: float | None = None
+        self._look_s = look_s
+        self._thread = threading.Thread(target=self._run, name="worker", daemon=True)
+
+    def start(self) -> None:
+        """Begin: open the devices, then wait for tasks."""
+        self._thread.start()
+
+    def join(self, timeout: float) -> bool:
+        """Wait for the thread's end; say whether it has ended."""
+        self._thread.join(timeout)
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        try:
+            self._work()
+        except BaseException:  # noqa: BLE001  # the loop must learn of the end, whatever it was
+            self._post(WorkerGone(traceback.format_exc()))
+        else:
+            self._post(WorkerGone())
+
+    def _work(self) -> None:
+        # Vision and calibration load their libraries while the loop already answers.
+        from legato.control.jobs import procedure
+        from legato.control.memory import Memory
+        from legato.daemon.devices import Devices
+
+        self._procedures = self._procedures or procedure
+        reference, registers = self._last
+        devices = Devices(self._make_cell(), self._settings, Memory(reference, registers))
+        try:
+            for problem in devices.open():
+                self._log.warning("missing", cause=problem.cause, text=problem.text)
+            self._tidy_up()
+            self._post(DevicesKnown(devices.view(), _versions()))
+            while self._serve(devices):
+                pass
+        finally:
+            devices.close()
+
+    def _serve(self, devices: "Devices") -> bool:
+        """Perform the next task, or look at the devices where there is none; False to end."""
+        wait, looks = RETRIES[0], 0
+        while True:
+            match self._orders.next_task(self._look_s):
+                case DoJob() as task:
+                    self._job(task, devices)
+                    return True
+                case DoReference(token, pose):
+                    self._task(token, devices, lambda: devices.reference(pose))
+                    return True
+                case DoReset(token):
+                    self._task(token, devices, devices.reopen)
+                    return True
+                case Quit():
+                    return False
+                case None:
+                    looks += 1
+                    again = not devices.complete and looks >= wait
+                    self._look(devices, again)
+                    if again:
+                        wait, looks = min(2 * wait, RETRIES[1]), 0
+
+    def _look(self, devices: "Devices", open_missing: bool) -> None:
+        try:
+            if open_missing:
+                devices.open()
+            devices.look()
+        except Exception:  # noqa: BLE001  # looking at a device must never end the worker
+            self._log.error("bug", traceback=traceback.format_exc())
+        self._post(Looked(devices.view()))
+
+    def _tidy_up(self) -> None:
+        """Remove old records once a day; only while no session can begin."""
+        now = time.monotonic()
+        if self._tidied_at is not None and now - self._tidied_at < TIDY_S:
+            return
+        self._tidied_at = now
+        try:
+            self._tidy()
+        except RecordError as error:
+            self._log.warning("not_tidied", text=error.text, hint=error.hint)
+
+    def _task(self, token: int, devices: "Devices", do: Callable[[], None]) -> None:
+        problem: tuple[str, str] | None = None
+        try:
+            do()
+        except DeviceError as error:
+            problem = error.text, error.hint
+        except Unreachable as error:
+            problem = f"the arm cannot stand there: {error}", "give the pose that it stands at"
+        except Exception as error:  # noqa: BLE001  # a bug ends the task, not the worker
+            self._log.error("bug", traceback=traceback.format_exc())
+            problem = f"{type(error).__name__}: {error}", "report it with the daemon's log"
+        self._post(TaskEnded(token, devices.view(), problem))
+
+    def _job(self, task: DoJob, devices: "Devices") -> None:
+        from legato.daemon.perform import Performer
+
+        performer = Performer(devices, self._settings, task.writer, self._orders, self._post)
+        outcome, reason, cause, fault = self._outcome(task, devices, performer)
+        try:
+            if devices.cell.witness is not None:
+                task.writer.document("truth", devices.cell.witness.testimony())
+        except RecordError as error:
+            if outcome not in (None, "fault"):
+                fault = FaultReport(Cause.DISK, error.text, error.hint)
+                outcome, reason, cause = "fault", fault.text, fault.cause
+        self._tidy_up()
+        self._post(JobEnded(task.session, outcome, reason, cause, fault, devices.view()))
+
+    def _outcome(
+        self, task: DoJob, devices: "Devices", performer: "Performer"
+    ) -> tuple[str | None, str | None, Cause | None, FaultReport | None]:
+        """Run a job's procedure; return outcome, reason, cause and fault, whatever it meets."""
+        from legato.daemon.perform import carry_out
+
+        assert self._procedures is not None
+        try:
+            now = devices.cell.clock.monotonic()
+            work = self._procedures(task.job, self._settings, devices.memory, now)
+            return carry_out(work, performer.perform, self._orders), None, None, None
+        except Dropped:
+            return None, None, None, None
+        except StopRequested:
+            return "stopped", None, None, None
+        except Refused as refused:
+            return "refused", str(refused), refused.cause, None
+        except CellFault as error:
+            fault = FaultReport(error.cause, error.text, error.hint, error.evidence)
+        except DeviceError as error:
+            fault = FaultReport(error.cause, error.text, error.hint)
+        except RecordError as error:
+            fault = FaultReport(Cause.DISK, error.text, error.hint)
+        except Exception as error:  # noqa: BLE001  # a bug ends in one outcome too
+            told = traceback.format_exc()
+            self._log.error("bug", session=task.session, traceback=told)
+            text = f"{type(error).__name__}: {error}"
+            hint = "report it with the record of this session"
+            fault = FaultReport(Cause.INTERNAL, text, hint, {"traceback": told})
+        evidence = {
+            "last_effects": list(performer.last_effects),
+            "last_bytes": list(getattr(devices.cell.arm, "last_bytes", ())),
+            "picture": performer.last_picture,
+            **fault.evidence,
+        }
+        fault = FaultReport(fault.cause, fault.text, fault.hint, evidence)
+        return "fault", fault.text, fault.cause, fault
+
+
+def _versions() -> dict[str, str]:
+    """Return the versions that a record names."""
+    return {
+        "legato": __version__,
+        "python": platform.python_version(),
+        "numpy": metadata.version("numpy"),
+        "opencv": metadata.version("opencv-python-headless"),
+    }

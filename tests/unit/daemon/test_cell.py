@@ -1,0 +1,58 @@
+"""The cell: drivers by configuration alone, one world for a simulated arm and camera."""
+
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+
+from legato.config.load import Loaded
+from legato.config.schema import CameraTable, CellTable, Config, RobotTable
+from legato.daemon.cell import WallClock, build_cell, build_clock
+from legato.drivers.opencv import OpenCVCamera
+from legato.drivers.sim.arm import SimArm
+from legato.drivers.sim.camera import SimCamera
+from legato.drivers.sim.clock import SimClock
+from legato.drivers.teachmover import TeachMover
+
+CELL = CellTable(camera_at_mm=(228.6, -101.6, 50.8), camera_looks_at_mm=(126.0, -11.0, 36.0))
+
+
+def loaded(robot: Literal["sim", "teachmover"], camera: Literal["sim", "opencv"]) -> Loaded:
+    """Return a configuration with these drivers."""
+    config = Config(cell=CELL, robot=RobotTable(driver=robot), camera=CameraTable(driver=camera))
+    return Loaded(config, Path("cell.toml"), "hash", {})
+
+
+@pytest.mark.parametrize(
+    ("robot", "camera", "arm_type", "camera_type", "clock"),
+    [
+        ("sim", "sim", SimArm, SimCamera, SimClock),
+        ("sim", "opencv", SimArm, OpenCVCamera, WallClock),
+        ("teachmover", "sim", TeachMover, SimCamera, WallClock),
+        ("teachmover", "opencv", TeachMover, OpenCVCamera, WallClock),
+    ],
+)
+def test_drivers_follow_the_configuration(
+    robot: Any, camera: Any, arm_type: type, camera_type: type, clock: type
+) -> None:
+    """Each pair of drivers is built; nothing is opened; only a simulated world has a witness."""
+    cell = build_cell(loaded(robot, camera))
+    assert (type(cell.arm), type(cell.camera), type(cell.clock)) == (arm_type, camera_type, clock)
+    assert (cell.witness is not None) == (robot == "sim")
+    assert (cell.stands_at is not None) == (robot == "sim")
+    assert cell.simulated == (robot == "sim")
+
+
+def test_a_clock_handed_in_is_the_cells() -> None:
+    """Events, records and the simulated world share one time."""
+    given = loaded("sim", "sim")
+    clock = build_clock(given)
+    assert build_cell(given, clock).clock is clock
+
+
+def test_the_wall_clock_does_not_wait_backwards() -> None:
+    """Negative waits are none."""
+    clock = WallClock()
+    before = clock.monotonic()
+    clock.sleep(-5.0)
+    assert clock.monotonic() >= before
