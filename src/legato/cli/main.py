@@ -1,0 +1,44 @@
+"""`legato`: puts the commands together; each stands in a file of its own."""
+
+import click
+
+from legato import __version__
+from legato.cli import act, jobs
+from legato.cli.check import check
+from legato.cli.demo import demo
+from legato.cli.detect import detect
+from legato.cli.emulate import emulate
+from legato.cli.exits import EPILOG
+from legato.cli.intrinsics import intrinsics
+from legato.cli.report import report
+from legato.cli.serve import serve
+from legato.cli.sessions import sessions
+from legato.cli.snapshot import snapshot
+from legato.cli.solve import solve
+from legato.cli.status import status
+from legato.cli.watch import watch
+
+
+class InOrder(click.Group):
+    """A group that lists its commands in the order in which they were added."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the commands' names."""
+        del ctx
+        return list(self.commands)
+
+
+@click.group(cls=InOrder, epilog=EPILOG)
+@click.version_option(__version__, prog_name="legato")
+def main() -> None:
+    """Control a leg-massage robot cell: one camera, a TeachMover arm, run unattended.
+
+    A stepper arm without encoders needs a hardware stop; the software is none.
+    """
+
+
+for item in (
+    demo, serve, status, *jobs.COMMANDS, *act.COMMANDS, watch, sessions, report,
+    detect, solve, intrinsics, snapshot, emulate, check,
+):  # fmt: skip
+    main.add_command(item)

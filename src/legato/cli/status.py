@@ -1,0 +1,61 @@
+"""`legato status`: what the cell does now."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from legato.cli.command import Context, command
+from legato.cli.exits import Exit
+from legato.cli.line import connected
+
+
+@command("status")
+def status(context: Context) -> None:
+    """Show the cell's state, its devices, calibration and fault; exit 4 in fault."""
+    with connected(context) as client:
+        answer = client.call("status")
+    context.output.document(answer)
+    context.output.table(("", ""), rows(answer))
+    if answer.get("state") == "fault":
+        context.end(Exit.FAULT)
+
+
+def rows(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return a status as names and values for a person."""
+    arm, camera = answer.get("arm") or {}, answer.get("camera") or {}
+    found = [
+        ("state", str(answer.get("state")) + (" (simulated)" if answer.get("simulated") else "")),
+        ("session", str(answer.get("session") or "-")),
+        ("arm", _arm(arm)),
+        ("camera", _camera(camera)),
+        ("calibration", _calibration(answer.get("calibration"))),
+        ("up", f"{answer.get('uptime_s') or 0:.0f} s, legato {answer.get('version')}"),
+    ]
+    if answer.get("station") is not None:
+        found.insert(2, ("station", f"{answer['station']:g} mm"))
+    if fault := answer.get("fault"):
+        found.append(("fault", f"{fault.get('cause')}: {fault.get('text')}"))
+        found.append(("what to do", str(fault.get("hint"))))
+    return found
+
+
+def _arm(arm: Mapping[str, Any]) -> str:
+    if not arm.get("connected"):
+        return "not connected"
+    if not arm.get("referenced"):
+        return "connected, not referenced"
+    place = ", ".join(f"{v:.1f}" for v in arm.get("xyz_mm") or ())
+    return f"at ({place}) mm, contact {'yes' if arm.get('contact') else 'no'}"
+
+
+def _camera(camera: Mapping[str, Any]) -> str:
+    if not camera.get("connected"):
+        return "not connected"
+    age = camera.get("age_s")
+    return "connected" + (f", last picture {age:.1f} s ago" if age is not None else "")
+
+
+def _calibration(calibration: Mapping[str, Any] | None) -> str:
+    if not calibration:
+        return "none"
+    valid = "verified" if calibration.get("valid") else "not verified"
+    return f"{valid}, {calibration.get('age_s') or 0:.0f} s old"

@@ -1,0 +1,235 @@
+"""Commands that need no daemon, on the simulated camera's own pictures and on real records."""
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from legato.cli.doctor import device, examine
+from legato.cli.exits import Exit
+from legato.config.intrinsics import read_intrinsics
+from legato.config.load import load
+from legato.records.store import Store
+from legato.vision.picture import encode_png
+from tests.unit.cli.samples import document, run, write_cell
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a simulated cell's file."""
+    return write_cell(tmp_path_factory.mktemp("cell"))
+
+
+@pytest.fixture(scope="module")
+def views(cell: Path) -> Path:
+    """Return a folder of pictures that `legato snapshot` took, and one that shows nothing."""
+    folder = cell.parent / "views"
+    result = run("snapshot", "--config", cell, "--out", folder, "--views", "14", "--json")
+    assert result.exit_code == 0, result.output
+    assert len(document(result)["files"]) == 14
+    blank = encode_png(np.full((576, 768), 128, dtype=np.uint8))
+    (folder / "blank.png").write_bytes(blank)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def picture(cell: Path) -> Path:
+    """Return a picture of the leg about where the paper lays it."""
+    folder = cell.parent / "one"
+    options = ("--views", "1", "--scatter-deg", "3", "--scatter-mm", "3")
+    assert run("snapshot", "--config", cell, "--out", folder, *options).exit_code == 0
+    return folder / "view-001.png"
+
+
+def test_snapshots_differ_in_pose_and_repeat_by_seed(views: Path, cell: Path) -> None:
+    """Each view has another leg pose; the same seed gives the same picture."""
+    again = cell.parent / "again"
+    run("snapshot", "--config", cell, "--out", again, "--views", "1")
+    first = (views / "view-001.png").read_bytes()
+    assert (again / "view-001.png").read_bytes() == first
+    assert (views / "view-002.png").read_bytes() != first
+
+
+def test_intrinsics_are_found_from_snapshots(cell: Path, views: Path, tmp_path: Path) -> None:
+    """From the pictures the true camera is found within its sigmas; the blank one is named."""
+    out = tmp_path / "found.toml"
+    files = sorted(views.glob("*.png"))
+    result = run("intrinsics", "--config", cell, *files, "--out", out, "--json")
+    assert result.exit_code == 0, result.output
+    told, found = document(result), read_intrinsics(out)
+    assert "blank.png" in " ".join(told["left_out"])
+    assert found.views == told["views"] >= 10
+    truth = load(cell).config.sim
+    for name in ("alpha_u", "alpha_v", "u0", "v0", "k1"):
+        error = abs(getattr(found, name) - getattr(truth, name))
+        assert error < 4.0 * told["sigma"][name], name
+    assert abs(found.alpha_u / truth.alpha_u - 1.0) < 0.003
+
+
+def test_too_few_pictures_are_refused_by_name(cell: Path, views: Path, tmp_path: Path) -> None:
+    """Fewer than ten usable pictures give no file; each unusable one is named with its reason."""
+    torn = tmp_path / "torn.png"
+    torn.write_bytes((views / "view-001.png").read_bytes()[:5000])
+    out = tmp_path / "found.toml"
+    wrong = [views / "blank.png", torn, tmp_path / "none.png"]
+    result = run("intrinsics", "--config", cell, *wrong, "--out", out)
+    assert result.exit_code == Exit.REFUSED
+    for file in wrong:
+        assert file.name in result.stderr
+    assert not out.exists()
+
+
+def test_detect_prints_the_marks(cell: Path, picture: Path) -> None:
+    """All ten marks of a fair picture are found, each with two coordinates."""
+    result = run("detect", picture, "--config", cell, "--json")
+    assert result.exit_code == 0, result.output
+    found = document(result)
+    assert len(found["marks"]) + len(found["missing"]) == 10
+    assert len(found["marks"]) >= 8
+    assert all(len(place) == 2 for place in found["marks"].values())
+
+
+def test_detect_on_a_blank_picture_fails_with_what_to_do(cell: Path, views: Path) -> None:
+    """Where no leg is seen every mark is missing, and the code is 1."""
+    result = run("detect", views / "blank.png", "--config", cell, "--json")
+    assert result.exit_code == Exit.FAILED
+    found = document(result)
+    assert (found["marks"], len(found["missing"])) == ({}, 10)
+    assert "what to do" in result.stderr
+
+
+def test_solve_accepts_a_fair_picture(cell: Path, picture: Path) -> None:
+    """With a known camera one picture gives a pose that every check accepts."""
+    result = run("solve", picture, "--config", cell, "--json")
+    assert result.exit_code == 0, result.output
+    found = document(result)
+    assert found["accepted"]
+    assert found["reasons"] == []
+    for key in ("camera_from_object", "world_from_object"):
+        assert np.array(found[key]).shape == (4, 4)
+    assert found["sigma"]["translation_mm"] < 0.5
+    assert len(found["sigma"]["stations_mm"]) == 4
+    assert found["seconds"] > 0
+
+
+def test_solve_takes_picks_marks_and_engine(cell: Path, picture: Path, tmp_path: Path) -> None:
+    """Picks of detect's own document give the same pose; --marks and --engine are heeded."""
+    picks = tmp_path / "picks.json"
+    picks.write_text(run("detect", picture, "--config", cell, "--json").stdout)
+    options = ("--engine", "separable", "--marks", "P1,P2,P3,P5,P6,P8,P7", "--json")
+    result = run("solve", picture, "--config", cell, "--picks", picks, *options)
+    found = document(result)
+    assert found["engine"] == "separable"
+    assert set(found["marks"]) <= {"P1", "P2", "P3", "P5", "P6", "P7", "P8"}
+    whole = document(run("solve", picture, "--config", cell, "--json"))
+    apart = np.array(found["world_from_object"]) - np.array(whole["world_from_object"])
+    assert np.abs(apart[:3, 3]).max() < 0.5
+
+
+def test_solve_refuses_what_gives_no_pose(cell: Path, views: Path, picture: Path) -> None:
+    """A blank picture, and marks in one plane, are refused with 3 and a reason."""
+    blank = run("solve", views / "blank.png", "--config", cell, "--json")
+    plane = run("solve", picture, "--config", cell, "--marks", "P2,P3,P4,P5,P6,P7", "--json")
+    for result in (blank, plane):
+        assert result.exit_code == Exit.REFUSED, result.output
+        found = document(result)
+        assert found["accepted"] is False
+        assert found["reasons"]
+
+
+def test_solve_refuses_marks_that_the_leg_has_not(cell: Path, picture: Path) -> None:
+    """A wrong name is a wrong command line, with the names that there are."""
+    for marks in ("P1,P99", "P1,P1", ","):
+        result = run("solve", picture, "--config", cell, "--marks", marks)
+        assert result.exit_code == Exit.USAGE
+        assert "P10" in result.stderr
+
+
+def test_check_is_content_with_the_simulated_cell(cell: Path) -> None:
+    """Configuration, intrinsics, stations, devices and disk are looked at, and all is well."""
+    result = run("check", "--config", cell, "--json")
+    assert result.exit_code == 0, result.output
+    names = [c["name"] for c in document(result)["checks"]]
+    for name in ("configuration", "intrinsics", "station 187 mm", "arm", "camera", "state_dir"):
+        assert name in names
+
+
+def test_check_names_what_is_missing_and_what_to_do(tmp_path: Path) -> None:
+    """Absent devices, an unwritable place and a full disk are each told, with code 1."""
+    (tmp_path / "file").touch()
+    cell = write_cell(tmp_path)
+    text = cell.read_text().replace('"state"', '"file/state"\nmin_free_mb = 999999999999')
+    text = text.replace("[camera]", "[camera]\ndriver = 'opencv'\nsource = 'no-camera'")
+    cell.write_text(text + "[robot]\ndriver = 'teachmover'\nport = '/dev/none'\n")
+    result = run("check", "--config", cell)
+    assert result.exit_code == Exit.FAILED
+    for part in ("/dev/none is not there", "no-camera is not there", "is no folder", "MB needed"):
+        assert part in result.stdout
+    assert result.stdout.count("what to do") >= 4
+
+
+def test_check_reports_a_missing_lens_beside_the_rest(tmp_path: Path) -> None:
+    """A missing intrinsics file is one finding among the others, with code 2."""
+    cell = write_cell(tmp_path)
+    (tmp_path / "lens.toml").unlink()
+    result = run("check", "--config", cell)
+    assert result.exit_code == Exit.USAGE
+    assert "legato intrinsics" in result.stdout
+    assert "station 7 mm" in result.stdout
+
+
+def test_check_finds_a_station_out_of_reach(tmp_path: Path) -> None:
+    """A leg laid beyond the arm is found before anybody tries."""
+    cell = write_cell(tmp_path, "leg_at_mm = [124.29, 200.0, 30.52]\n")
+    findings = {f.name: f for f in examine(load(cell), datetime(2026, 11, 22, tzinfo=UTC))}
+    assert findings["station 187 mm"].ok is False
+    assert findings["station 187 mm"].hint
+
+
+def test_old_intrinsics_deserve_a_look(cell: Path) -> None:
+    """After half a year the camera should be calibrated again; nothing is hindered."""
+    findings = {f.name: f for f in examine(load(cell), datetime(2027, 11, 22, tzinfo=UTC))}
+    assert findings["intrinsics"].ok is None
+    assert "366 days" in findings["intrinsics"].text
+
+
+def test_a_device_that_is_there_is_content(tmp_path: Path) -> None:
+    """A readable file passes as a source of pictures."""
+    file = tmp_path / "film.avi"
+    file.touch()
+    assert device("camera", file, "").ok
+
+
+def test_sessions_are_listed_and_shown_without_a_daemon(cell: Path) -> None:
+    """Records on disk are listed newest first; one is shown with states and contacts."""
+    store = Store(cell.parent / "state")
+    for minute, outcome in ((1, "done"), (2, "refused")):
+        started = f"2026-11-22T01:0{minute}:00+00:00"
+        meta = {"job": "run", "params": {}, "started": started, "simulated": True}
+        writer = store.begin(meta)
+        data = {"state": "capture", "previous": "idle", "cause": "run"}
+        writer.event("state", data, t=1.0, wall=started)
+        contact = {"station_mm": 7.0, "stroke": 1, "contact_mm": 0.1, "place_mm": 7.0}
+        writer.event("contact", contact, t=2.0, wall=started)
+        writer.finish(outcome, "why not", None, started)
+    listed = document(run("sessions", "--config", cell, "--json"))
+    assert [s["outcome"] for s in listed] == ["refused", "done"]
+    shown = document(run("sessions", listed[0]["id"], "--config", cell, "--json"))
+    assert (shown["states"], shown["contacts"][0]["contact_mm"]) == (["capture"], 0.1)
+    text = run("sessions", "--config", cell, "--limit", "1").stdout
+    assert "refused" in text
+    assert "done" not in text
+    other = run("sessions", "--state-dir", cell.parent / "elsewhere")
+    assert "no sessions" in other.stdout
+
+
+def test_a_session_that_is_not_there_is_an_error_in_words(cell: Path) -> None:
+    """Neither a wrong id nor an empty store gives a traceback."""
+    result = run("sessions", "../../etc", "--config", cell, "--json")
+    assert result.exit_code == Exit.FAILED
+    assert "no session id" in json.loads(result.stdout)["error"]["text"]
+    empty = run("report", "--state-dir", cell.parent / "elsewhere")
+    assert empty.exit_code == Exit.FAILED
+    assert "legato demo" in empty.stderr
