@@ -1,0 +1,157 @@
+"""The whole job through the TeachMover's driver, on the pseudo-terminal of `legato emulate`.
+
+What was touched is told by the emulator's own world, of which the daemon knows nothing.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from legato.cli.child import daemon
+from legato.config.load import load
+from legato.config.toml import dumps
+from legato.daemon.client import Client, RpcError
+from legato.geometry.leg import Leg
+from legato.hal.faults import Cause
+from legato.records.store import Store
+
+SCALE = 40.0
+STATIONS = (7.0, 67.0, 127.0, 187.0)
+HOME = {"xyz_mm": [127.0, 0.0, 150.0], "pitch_deg": -90.0, "roll_deg": 0.0}
+
+
+class Cell:
+    """A daemon and the emulator that its arm's driver talks to."""
+
+    def __init__(self, folder: Path, *faults: str, **sim: Any) -> None:
+        self.folder = folder
+        self.config = configuration(folder, **sim)
+        options = [part for text in faults for part in ("--fault", text)]
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "legato.cli.leash", "emulate", "--json", *options,
+             "--config", str(self.config), "--time-scale", str(SCALE),
+             "--link", str(folder / "arm"), "--truth", str(folder / "truth.json")],
+            env=os.environ | {"LEGATO_PARENT": str(os.getpid())},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )  # fmt: skip
+        assert self.process.stdout is not None
+        self.port = json.loads(self.process.stdout.readline())["port"]
+
+    def truth(self) -> dict[str, Any]:
+        """Return what truly happened so far; the emulator says when it has written it."""
+        self.process.send_signal(signal.SIGUSR1)
+        assert self.process.stderr is not None
+        for line in self.process.stderr:
+            if line.startswith("truth:"):
+                break
+        found: dict[str, Any] = json.loads((self.folder / "truth.json").read_text())
+        return found
+
+    def end(self) -> int:
+        """End the emulator and return its exit code."""
+        self.process.send_signal(signal.SIGTERM)
+        try:
+            self.process.communicate(timeout=20.0)
+        finally:
+            self.process.kill()
+        return self.process.returncode
+
+    def record(self, session: str) -> Any:
+        """Return a session's record."""
+        return Store(self.folder / "state").read(session)
+
+
+def configuration(folder: Path, **sim: Any) -> Path:
+    """Write a cell with the TeachMover's driver and the simulated camera."""
+    data: dict[str, Any] = {name: dict(table) for name, table in load().data.items()}
+    data["server"] = dict.fromkeys(("requests", "events", "stop"), "tcp://127.0.0.1:*")
+    data["records"] |= {"state_dir": str(folder / "state"), "min_free_mb": 1}
+    data["robot"] |= {"driver": "teachmover", "port": str(folder / "arm")}
+    data["massage"] |= {"dwell_s": 0.02}
+    data["sim"] |= sim
+    path = folder / "cell.toml"
+    path.write_text(dumps(data, "Made by a test."), encoding="utf-8")
+    return path
+
+
+@contextmanager
+def running(folder: Path, *faults: str, **sim: Any) -> Iterator[tuple[Cell, Client]]:
+    """Give an emulator, and a client of a daemon that drives it; the arm is referenced."""
+    cell = Cell(folder, *faults, **sim)
+    try:
+        with daemon(cell.config, folder / "daemon.log") as (_, client):
+            client.call("reference", **HOME)
+            yield cell, client
+    finally:
+        assert cell.end() == 0
+
+
+def ended(client: Client, method: str) -> dict[str, Any]:
+    """Run a job to its end and return the answer of `wait`."""
+    session = client.call(method)["session"]
+    answer: dict[str, Any] = client.call("wait", session=session, timeout_s=4.0)
+    while answer["outcome"] is None:
+        answer = client.call("wait", session=session, timeout_s=4.0)
+    return answer | {"session": session}
+
+
+def test_the_whole_job_over_the_line(tmp_path: Path) -> None:
+    """Every true touch lies at its station, and nothing else is touched or asked too much."""
+    with running(tmp_path, seed=3, backlash_steps=6.0) as (cell, client):
+        before = cell.truth()
+        assert ended(client, "run")["outcome"] == "done"
+        truth = cell.truth()
+    assert before["account"]["commands"]["step"] == 0
+    assert truth["breaches"] == []
+    assert truth["lost_steps"] == [0.0] * 6
+    assert {t["surface"] for t in truth["touches"]} == {"leg"}
+    places = np.array([t["object_mm"] for t in truth["touches"]])
+    wanted = np.repeat(Leg().surface_point(list(STATIONS)), 3, axis=0)
+    errors = np.linalg.norm(places - wanted, axis=1)
+    assert errors.max() <= 1.0
+    assert np.sqrt((errors**2).mean()) <= 0.5
+    assert truth["tip"]["xyz_mm"] == pytest.approx(HOME["xyz_mm"], abs=1.5)
+
+
+def test_a_vanished_adapter_is_a_fault_until_reset_and_reference(tmp_path: Path) -> None:
+    """The fault keeps the last bytes, nothing moves until a person has acted, and then it does."""
+    with running(tmp_path, "hang-up:after=70,by=0", seed=3) as (cell, client):
+        end = ended(client, "run")
+        assert end["outcome"] == "fault"
+        fault = client.call("status")["fault"]
+        assert fault["cause"] == Cause.ARM_LOST
+        (kept,) = cell.record(end["session"]).of_kind("fault")
+        assert any("@STEP" in chunk for chunk in kept["data"]["evidence"]["last_bytes"])
+        with pytest.raises(RpcError, match="fault"):
+            client.call("home")
+        assert cell.truth()["account"]["commands"]["step"] == 71
+        client.call("reset")
+        assert client.call("status")["state"] == "idle"
+        with pytest.raises(RpcError) as refused:
+            client.call("home")
+        assert "reference" in str(refused.value.data)
+        truth = cell.truth()
+        assert truth["account"]["commands"]["step"] == 71
+        client.call("reference", **truth["tip"])
+        assert ended(client, "home")["outcome"] == "done"
+        assert cell.truth()["tip"]["xyz_mm"] == pytest.approx(HOME["xyz_mm"], abs=1.5)
+
+
+def test_the_link_goes_with_the_emulator(tmp_path: Path) -> None:
+    """At SIGTERM the emulator ends with 0, its truth written and its link gone."""
+    cell = Cell(tmp_path)
+    assert (tmp_path / "arm").is_symlink()
+    assert cell.end() == 0
+    assert not (tmp_path / "arm").is_symlink()
+    assert json.loads((tmp_path / "truth.json").read_text())["simulated"] is True

@@ -1,0 +1,97 @@
+"""README's commands, as printed, against a real daemon in a home folder of its own."""
+
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+LEGATO = ".venv/bin/legato"
+
+
+def blocks(kind: str) -> list[str]:
+    """Return README's fenced blocks of a kind."""
+    return re.findall(rf"```{kind}\n(.*?)```", TEXT, re.DOTALL)
+
+
+def commands() -> list[str]:
+    """Return every command that README tells a reader to type, in order."""
+    lines = "\n".join(blocks("console")).splitlines()
+    return [line.removeprefix("$ ") for line in lines if line.startswith("$ ")]
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> dict[str, str]:
+    """Return an environment whose records go to a folder that ends with the test."""
+    return os.environ | {"HOME": str(tmp_path), "COLUMNS": "120"}
+
+
+def run(command: str, home: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    """Run one of README's commands in the home folder."""
+    words = command.removeprefix(LEGATO).split()
+    return subprocess.run(
+        [sys.executable, "-m", "legato", *words],
+        env=home,
+        cwd=home["HOME"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=90,
+    )
+
+
+def answering(home: dict[str, str]) -> None:
+    """Wait until the daemon answers."""
+    until = time.monotonic() + 30.0
+    while run(f"{LEGATO} status", home).returncode != 0:
+        assert time.monotonic() < until, "the daemon never answered"
+
+
+def test_every_make_target_that_readme_names_exists() -> None:
+    """`make demo` and `make test` are targets of the Makefile."""
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    named = [c.removeprefix("make ") for c in commands() if c.startswith("make ")]
+    assert named == ["demo", "test"]
+    assert all(re.search(rf"^{target}:", makefile, re.MULTILINE) for target in named)
+
+
+def test_readmes_commands_work_as_printed(home: dict[str, str]) -> None:
+    """A reader who types them one after the other gets through a whole session and its report."""
+    typed = [c for c in commands() if c.startswith(LEGATO)]
+    assert typed[0] == f"{LEGATO} serve"
+    serve = subprocess.Popen(
+        [sys.executable, "-m", "legato", "serve"],
+        env=home,
+        cwd=home["HOME"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        answering(home)
+        for command in typed[1:]:
+            done = run(command, home)
+            assert done.returncode == 0, f"{command}: {done.stderr}"
+        (snippet,) = blocks("python")
+        shown = subprocess.run(
+            [sys.executable, "-c", snippet], capture_output=True, text=True, check=True, timeout=30
+        )
+        assert shown.stdout.strip() == "idle"
+        assert run(f"{LEGATO} shutdown", home).returncode == 0
+        assert serve.wait(timeout=20) == 0
+    finally:
+        serve.kill()
+        serve.wait()
+    assert list(Path(home["HOME"]).rglob("report.html"))
+
+
+def test_every_file_that_readme_shows_or_names_exists() -> None:
+    """Pictures and folders that README points to are there."""
+    shown = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", TEXT)
+    named = re.findall(r"`((?:etc|systemd|docs|src)/[^`*]*)`", TEXT)
+    missing = [p for p in {*shown, *named} if not (ROOT / p).exists()]
+    assert not missing
