@@ -3,7 +3,7 @@
 import importlib
 import sys
 
-NAMES = ("demo", "passes")
+NAMES = ("paper", "demo", "line", "passes")
 
 
 def main(names: list[str]) -> int:
