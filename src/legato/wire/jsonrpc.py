@@ -11,7 +11,7 @@ from typing import Any, Final, cast
 
 import msgspec
 
-from legato.wire.requests import REQUESTS, Request
+from legato.wire.requests import REQUESTS, STOP_LINE, Ping, Request, StopNow
 
 MAX_BYTES: Final = 64 * 1024
 MAX_DEPTH: Final = 16
@@ -80,17 +80,29 @@ def receive(frames: Sequence[bytes]) -> Call | Malformed:
         document = msgspec.json.decode(body)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError, ValueError) as error:
         return Malformed(route, Failure("parse_error", f"not JSON: {error}"))
-    return _call(route, document)
+    # So few brackets cannot nest deeper; most requests need no closer look.
+    shallow = body.count(b"{") + body.count(b"[") <= MAX_DEPTH
+    return _call(route, document, shallow=shallow)
 
 
 def decode_params(call: Call) -> Request:
     """Return the typed request of a call; raises Failure (unknown method, unfit parameters)."""
-    kind = REQUESTS.get(call.method)
+    return cast(Request, _converted(call, REQUESTS, "describe lists them all"))
+
+
+def decode_stop(call: Call) -> Ping | StopNow:
+    """Return the typed request of a call on the stop line; raises Failure."""
+    hint = "this is the stop line: ping, stop and estop; ask the request line for all else"
+    return cast(Ping | StopNow, _converted(call, STOP_LINE, hint))
+
+
+def _converted(call: Call, methods: Mapping[str, type[msgspec.Struct]], hint: str) -> Any:
+    """Return a call's parameters as its method's type; `hint` helps with an unknown method."""
+    kind = methods.get(call.method)
     if kind is None:
-        name = call.method[:64]
-        raise Failure("method_not_found", f"there is no method {name!r}", "describe lists them all")
+        raise Failure("method_not_found", f"there is no method {call.method[:64]!r} here", hint)
     try:
-        return cast(Request, msgspec.convert(call.params, kind, strict=True))
+        return msgspec.convert(call.params, kind, strict=True)
     except msgspec.ValidationError as error:
         hint = "describe gives each method's parameters"
         raise Failure("invalid_params", f"{call.method}: {error}", hint) from error
@@ -128,7 +140,7 @@ def _split(frames: Sequence[bytes]) -> tuple[Route, bytes | None]:
     return (identity,), rest[0] if len(rest) == 1 else None
 
 
-def _call(route: Route, document: Any) -> Call | Malformed:
+def _call(route: Route, document: Any, *, shallow: bool) -> Call | Malformed:
     """Return the call that a decoded document is."""
 
     def malformed(reason: str, name: str = "invalid_request") -> Malformed:
@@ -143,7 +155,7 @@ def _call(route: Route, document: Any) -> Call | Malformed:
         call_id = document.get("id")
     elif "id" in document:
         return malformed(f"id is a number, null, or a string of at most {MAX_ID_LENGTH} characters")
-    if _too_deep(document):
+    if not shallow and _too_deep(document):
         return malformed(f"nested deeper than {MAX_DEPTH}")
     if document.get("jsonrpc") != "2.0":
         return malformed('jsonrpc must be "2.0"')

@@ -3,6 +3,7 @@
 Names and meanings are part of the wire. Unknown parameters and wrong types are refused.
 """
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
 import msgspec
@@ -17,7 +18,7 @@ Point = tuple[float, float, float]
 
 
 class Ping(Struct, frozen=True, forbid_unknown_fields=True):
-    """Say that the daemon lives: boot and uptime."""
+    """Say that the daemon lives: its boot, state, and clock."""
 
 
 class Status(Struct, frozen=True, forbid_unknown_fields=True):
@@ -28,7 +29,18 @@ class Describe(Struct, frozen=True, forbid_unknown_fields=True):
     """Return methods, states, the table of both, errors, fault causes and outcomes."""
 
 
-class Job(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Acting(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What changes the cell.
+
+    `lease` is the lease's token where one is held. Past `expires_at`, in the daemon's monotonic s
+    as `ping` tells it in `now`, nothing is done any more.
+    """
+
+    lease: Name | None = None
+    expires_at: float | None = None
+
+
+class Job(Acting, frozen=True, kw_only=True):
     """Start a job and return its session at once.
 
     The same `key` again returns the same session and starts nothing.
@@ -61,11 +73,11 @@ class Massage(Job, frozen=True):
     """Massage every station with the verified calibration."""
 
 
-class Pause(Struct, frozen=True, forbid_unknown_fields=True):
+class Pause(Acting, frozen=True):
     """Retract at the next safe point and hold."""
 
 
-class Resume(Struct, frozen=True, forbid_unknown_fields=True):
+class Resume(Acting, frozen=True):
     """Go on with the stroke that was broken off."""
 
 
@@ -77,11 +89,21 @@ class Estop(Struct, frozen=True, forbid_unknown_fields=True):
     """Send no further motion command; fault. Never refused."""
 
 
-class Reset(Struct, frozen=True, forbid_unknown_fields=True):
+class StopNow(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Stop, on the stop line; answered when the motion on its way has ended or the time is up."""
+
+    timeout_s: Annotated[float, Meta(ge=0, le=30)] = 0.3
+
+
+class EstopNow(StopNow, frozen=True, kw_only=True):
+    """Send no further motion command, on the stop line; answered like stop."""
+
+
+class Reset(Acting, frozen=True):
     """Leave fault once arm and camera answer."""
 
 
-class Reference(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Reference(Acting, frozen=True, kw_only=True):
     """Say at which pose the arm stands now; the configured start pose by default."""
 
     xyz_mm: Point | None = None
@@ -116,13 +138,25 @@ class EventsSince(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     limit: Annotated[int, Meta(ge=1, le=1000)] = 500
 
 
-class Shutdown(Struct, frozen=True, forbid_unknown_fields=True):
+class Lease(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Keep the cell for this client: others may read and stop, nothing else.
+
+    Renewed by the token in `lease`, ended by `duration_s` 0. With `deadman` a lease that ends for
+    want of renewal pauses the arm.
+    """
+
+    lease: Name | None = None
+    duration_s: Annotated[float, Meta(ge=0, le=60)] = 10.0
+    deadman: bool = False
+
+
+class Shutdown(Acting, frozen=True):
     """Stop what runs, let go of the devices, end the daemon."""
 
 
 Request = (
     Ping | Status | Describe | Wait | Sessions | Session | EventsSince | Shutdown | Job
-    | Pause | Resume | Stop | Estop | Reset | Reference
+    | Pause | Resume | Stop | Estop | Reset | Reference | Lease
 )  # fmt: skip
 
 REQUESTS: Final[dict[str, type[Struct]]] = {
@@ -145,15 +179,19 @@ REQUESTS: Final[dict[str, type[Struct]]] = {
     "sessions": Sessions,
     "session": Session,
     "events_since": EventsSince,
+    "lease": Lease,
     "shutdown": Shutdown,
 }
 
+STOP_LINE: Final[dict[str, type[Struct]]] = {"ping": Ping, "stop": StopNow, "estop": EstopNow}
+"""All that the stop line knows."""
 
-def describe_methods() -> dict[str, dict[str, Any]]:
+
+def describe_methods(methods: Mapping[str, type[Struct]] = REQUESTS) -> dict[str, dict[str, Any]]:
     """Return each method's sentence and the JSON Schema of its parameters."""
     return {
         name: {"does": _first_line(kind), "params": msgspec.json.schema(kind)}
-        for name, kind in REQUESTS.items()
+        for name, kind in methods.items()
     }
 
 
