@@ -55,6 +55,23 @@ def cast(leg: Leg, origins: ArrayLike, directions: ArrayLike) -> Hits:
     return Hits(part, distance, points, normals_of(leg, part, points))
 
 
+def points_on(leg: Leg, part: int, origins: ArrayLike, directions: ArrayLike) -> Array:
+    """Return where rays first meet the named part (..., 3), NaN where they miss it.
+
+    What else lies before it is not asked: a part that faces the origin hides nothing of itself.
+    """
+    o, d = np.broadcast_arrays(
+        np.asarray(origins, dtype=float), np.asarray(directions, dtype=float)
+    )
+    if part == SIDE:
+        t = np.minimum(*_side_distances(leg, o, d))
+    else:
+        x, radius = (0.0, leg.big_radius) if part == BIG_FACE else (leg.length, leg.small_radius)
+        t = _face_distance(o, d, x, radius)
+    t[np.isinf(t)] = np.nan
+    return np.asarray(o + t[..., None] * d)
+
+
 def normals_of(leg: Leg, part: NDArray[np.int8], points: Array) -> Array:
     """Return outward unit normals (..., 3) of surface points (..., 3) on the named parts."""
     h = leg.half_angle
