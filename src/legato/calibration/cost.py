@@ -31,7 +31,7 @@ class Model:
 
     `weights` (M,) are sigma / sigma_of_mark, where `sigma` px is the harmonic reference: equal
     marks weigh 1, and costs stay in px^2. `search` (2, 11) bounds the genetic search, `box` (2, 11)
-    the refinement; genes that `wrap` run round the whole circle. `prior` (11, 11) is information
+    the refinement of `tied` genes; genes that `wrap` run round the whole circle. `prior` (11, 11) is information
     in units of 1 / sigma^2 about `mean` (11,), or None.
     """
 
@@ -61,7 +61,9 @@ def prepare(problem: Problem) -> Model:
     search[:, full_turn] = [[-np.pi], [np.pi]]
     pixels, prior = np.asarray(problem.pixels, dtype=float), None
     box = search.copy()
-    if problem.known is not None:
+    if problem.known is None:
+        box = _alpha_box(box)
+    else:
         pixels = pinhole_pixels(problem.known.intrinsics, pixels)
         search, box, prior = _fixed_intrinsics(problem.known, search, sigma)
     box[0, full_turn], box[1, full_turn] = -np.inf, np.inf
@@ -90,6 +92,30 @@ def checked_bounds(bounds: Mapping[str, tuple[float, float]]) -> Array:
                 f"bounds of {gene} are {low} and {high}", "give two finite numbers, lower first"
             )
     return np.array([bounds[gene] for gene in GENES], dtype=float).T
+
+
+def _alpha_box(bounds: Array) -> Array:
+    """Return the refinement's box: f held at 1, so that s_x and s_y are alpha_u and alpha_v.
+
+    Free all three share a direction in which nothing changes. Where one is held already they do
+    not, and the box stays as it is.
+    """
+    box = bounds.copy()
+    if (bounds[1, :3] > bounds[0, :3]).all():
+        box[:, 0] = 1.0
+        box[:, 1:3] = bounds[:, :1] * bounds[:, 1:3]
+    return box
+
+
+def tied(model: Model, genes: Array) -> Array:
+    """Return genes (N, 11) with f where the refinement's box holds it, and the same alphas."""
+    low, high = model.box[:, 0]
+    if high > low:
+        return genes
+    out = genes.copy()
+    out[:, 0] = low
+    out[:, 1:3] *= genes[:, :1] / low
+    return out
 
 
 def _fixed_intrinsics(
@@ -130,6 +156,18 @@ def residuals(model: Model, genes: Array) -> Array:
         flat = c[:, :2] / c[:, 2:]
     predicted = flat * (genes[:, :1] * genes[:, 1:3])[:, :, None] + genes[:, 3:5, None]
     return np.asarray(np.swapaxes(predicted - model.pixels.T, 1, 2))
+
+
+def mark_costs(model: Model, genes: Array) -> Array:
+    """Return each mark's share (N, M) px^2 of the cost; 1e12 for a mark behind the camera."""
+    out = np.empty((len(genes), len(model.points)))
+    for start in range(0, len(genes), BLOCK):
+        part = genes[start : start + BLOCK]
+        off = residuals(model, part) * model.weights[:, None]
+        square = np.sum(off * off, axis=2)
+        behind = in_camera(model.points, part)[1][:, 2] <= 0.0
+        out[start : start + BLOCK] = np.where(behind | ~np.isfinite(square), 1e12, square)
+    return out
 
 
 def cost(model: Model, genes: Array, weights: Array | None = None) -> Array:

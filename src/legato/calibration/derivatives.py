@@ -6,7 +6,7 @@ normal equations are one product. The public functions speak of (M, 2) pixels al
 
 import numpy as np
 
-from legato.calibration.cost import ANGLES, Model, in_camera
+from legato.calibration.cost import ANGLES, Indices, Model, in_camera
 from legato.calibration.problem import GENES
 from legato.geometry.transforms import Array
 
@@ -18,7 +18,7 @@ def jacobian(model: Model, genes: Array) -> tuple[Array, Array]:
 
 
 def normal_equations(
-    model: Model, genes: Array, weights: Array, free: slice | Array | None = None
+    model: Model, genes: Array, weights: Array, free: slice | Indices | None = None
 ) -> tuple[Array, Array, Array]:
     """Return cost (N,) px^2, J^T W J (N, R, R) and J^T W r (N, R), prior included.
 

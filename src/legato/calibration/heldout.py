@@ -9,9 +9,8 @@ from itertools import combinations
 
 import numpy as np
 
-from legato.calibration.cost import Model, prepare, residuals
+from legato.calibration.cost import Model, mark_costs, prepare, residuals
 from legato.calibration.degeneracy import inspect
-from legato.calibration.hybrid import genes_to_search, search_and_refine
 from legato.calibration.problem import EngineSettings, Problem, Solution
 from legato.calibration.refine import refine
 from legato.calibration.solve import LEAST_FREE, LEAST_KNOWN
@@ -25,6 +24,9 @@ from legato.geometry.transforms import Array
 
 # One explanation is certain where every other has a chi-square larger by so much: odds of e^10.
 DECISIVE = 20.0
+# Genes drawn to start from, and how many of them each group refines: more where one mark off the
+# plane of the others makes local minima.
+CROWD, STARTS, WIDE_STARTS, ROUNDS = 2000, 8, 32, 50
 
 
 @dataclass(frozen=True)
@@ -61,11 +63,12 @@ class Suspects:
 
 @dataclass(frozen=True)
 class _Trial:
-    """The chi-square left without a group of marks, and what noise passes once in a thousand."""
+    """The chi-square left without a group of marks, what noise passes, and the fit (11,)."""
 
     misfit: float
     limit: float
     names: tuple[str, ...]
+    genes: Array
 
     @property
     def heals(self) -> bool:
@@ -106,7 +109,7 @@ def _predicted(
 def suspects(
     problem: Problem, solution: Solution, settings: EngineSettings, rng: np.random.Generator
 ) -> Suspects:
-    """Name the one or two marks that spoil a fit; each subset is solved anew, not from the spoilt.
+    """Name the one or two marks that spoil a fit; each subset is solved anew, from everywhere.
 
     A subset too small to be tested is not tried. One in a plane is: that it has no pose does not
     exonerate the marks that it lacks.
@@ -119,31 +122,69 @@ def suspects(
     limit = noise_limit(freedom)
     if value <= limit:
         return Suspects((), (), value, limit, explained=True)
+    low, high = model.search
+    crowd = rng.uniform(low, high, (max(CROWD, settings.population), len(low)))
     for count in (1, 2):
-        groups = combinations(problem.names, count)
-        found = [_without(problem, group, settings, rng) for group in groups]
-        trials = sorted((t for t in found if t is not None), key=lambda t: t.misfit)
+        groups = [g for g in combinations(problem.names, count) if _testable(problem, g)]
+        trials = _trials(problem, model, groups, crowd, refined.genes)
         if trials and trials[0].heals:
-            best = trials[0]
-            rivals = [t for t in trials[1:] if t.heals or t.misfit < best.misfit + DECISIVE]
-            others = {n for t in rivals for n in t.names} - set(best.names)
-            return Suspects(best.names, tuple(sorted(others)), value, limit, explained=True)
+            # What explains the marks as well may lie where the first search did not start.
+            again = _trials(problem, model, groups, crowd, trials[0].genes[None])
+            return _verdict(trials + again, value, limit)
     return Suspects((), (), value, limit, explained=False)
 
 
-def _without(
-    problem: Problem, names: tuple[str, ...], settings: EngineSettings, rng: np.random.Generator
-) -> _Trial | None:
-    """Return how the rest fits when `names` are left out, or None where too few remain."""
-    rest = without(problem, names)
-    if len(rest.names) < (LEAST_FREE if problem.known is None else LEAST_KNOWN):
-        return None
-    model = prepare(rest)
-    quick = replace(settings, search_generations=max(1, settings.search_generations // 3))
-    wide = problem.known is None and not inspect(rest).linear_start
-    _, refined = search_and_refine(model, genes_to_search(rest), quick, rng, wide)
-    value, freedom = misfit(model, refined.genes[int(np.argmin(refined.cost))])
-    return _Trial(value, noise_limit(freedom), names)
+def _verdict(trials: list[_Trial], value: float, limit: float) -> Suspects:
+    """Return whom the best of the trials names, and who else may be to blame."""
+    best = min(trials, key=lambda t: t.misfit)
+    rivals = [t for t in trials if t.heals or t.misfit < best.misfit + DECISIVE]
+    others = {n for t in rivals for n in t.names} - set(best.names)
+    return Suspects(best.names, tuple(sorted(others)), value, limit, explained=True)
+
+
+def _testable(problem: Problem, names: tuple[str, ...]) -> bool:
+    """Say whether enough marks remain without `names` for their misfit to mean anything."""
+    least = LEAST_FREE if problem.known is None else LEAST_KNOWN
+    return len(problem.names) - len(names) >= least
+
+
+def _trials(
+    problem: Problem,
+    model: Model,
+    groups: list[tuple[str, ...]],
+    crowd: Array,
+    starts: Array,
+) -> list[_Trial]:
+    """Return how the rest fits without each group, best first; all groups are refined together.
+
+    Each starts from those of a `crowd` (N, 11), drawn from the whole box, that its own marks like
+    best, and from `starts` (K, 11).
+    """
+    if not groups:
+        return []
+    squares = mark_costs(model, crowd)
+    kept = np.array([[n not in g for n in problem.names] for g in groups])
+    first, owner = [], []
+    for i, keep in enumerate(kept):
+        count = STARTS if problem.known is not None or _sound(problem, groups[i]) else WIDE_STARTS
+        best = np.argpartition(squares @ keep, count)[:count]
+        first.append(np.concatenate([crowd[best], starts]))
+        owner.append(np.full(count + len(starts), i))
+    of = np.concatenate(owner)
+    weights = model.weights * kept
+    fits = refine(model, np.concatenate(first), weights[of], rounds=ROUNDS)
+    trials = []
+    for i, group in enumerate(groups):
+        mine = np.flatnonzero(of == i)
+        genes = fits.genes[mine[np.argmin(fits.cost[mine])]]
+        value, freedom = misfit(model, genes, weights[i])
+        trials.append(_Trial(value, noise_limit(freedom), group, genes))
+    return sorted(trials, key=lambda t: t.misfit)
+
+
+def _sound(problem: Problem, names: tuple[str, ...]) -> bool:
+    """Say whether the marks without `names` have no local minima to fear."""
+    return inspect(without(problem, names)).linear_start
 
 
 def without(problem: Problem, names: tuple[str, ...]) -> Problem:

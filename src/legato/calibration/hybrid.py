@@ -19,6 +19,8 @@ from legato.geometry.transforms import Array
 
 # One mark off the plane of the others makes local minima: search wider, refine more.
 WIDE_POPULATION, WIDE_GENERATIONS, WIDE_ELITES = 200, 20, 64
+# There, more than half may agree on a local one: only so many of the slowest are not waited for.
+WIDE_ENDED = 0.85
 # Fewer elites than this at the best optimum: look again, wider.
 LEAST_WITNESSES = 3
 
@@ -67,6 +69,7 @@ def solve_searched(
     wide = problem.known is None and not inspect(problem).linear_start
     run, refined = search_and_refine(model, searched, settings, rng, wide)
     best = int(np.argmin(refined.cost))
+    met = bool((refined.converged & refined.at_best()).any())
     return outcome(
         problem,
         model,
@@ -76,7 +79,7 @@ def solve_searched(
         agreement=agreement(refined),
         trace=run.trace,
         generations=run.generations,
-        stopped_by="converged" if refined.converged[best] else "generations",
+        stopped_by="converged" if met else "generations",
     )
 
 
@@ -100,13 +103,19 @@ def search_and_refine(
         count = max(settings.search_elites, searched.wide_elites if wide else 1)
         starts = np.concatenate([searched.fill(model, elites(run, count)), found])
         # Half are the search's and half chance's: more than half agree only where both do.
-        return run, refine(model, starts, enough=len(starts) // 2 + 1)
+        most = len(starts) // 2 + 1
+        return run, refine(model, starts, None, enough=most, ended=_ended(len(starts), wide))
 
     run, refined = once(wide, np.zeros((0, 11)))
     witnesses = np.count_nonzero(refined.at_best())
     if not wide and witnesses < min(LEAST_WITNESSES, len(refined.cost)):
         return once(True, refined.genes[[int(np.argmin(refined.cost))]])
     return run, refined
+
+
+def _ended(count: int, wide: bool) -> int:
+    """Return how many starts must have come to an end: nearly all where local minima lurk."""
+    return int(np.ceil(WIDE_ENDED * count)) if wide else 0
 
 
 def short(settings: EngineSettings, wide: bool, shorter: int) -> EngineSettings:

@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from legato.calibration.cost import Model, prepare, residuals, split_alphas
+from legato.calibration.cost import Model, prepare, residuals, split_alphas, tied
 from legato.calibration.problem import GENES, CalibrationError, Problem, Solution, Trace, pose_of
 from legato.calibration.refine import Refined
 from legato.calibration.uncertainty import (
     covariance_of,
     misfit,
     noise_limit,
+    root_trace,
     station_sigmas,
     widening,
 )
@@ -63,8 +64,8 @@ def outcome(
         rms_px=float(np.sqrt(np.mean(off**2))),
         residuals=project(camera, place, problem.points) - problem.pixels,
         covariance=covariance,
-        sigma_rotation=float(np.sqrt(np.trace(covariance[4:7, 4:7]))),
-        sigma_translation=float(np.sqrt(np.trace(covariance[7:, 7:]))),
+        sigma_rotation=float(root_trace(covariance[4:7, 4:7])),
+        sigma_translation=float(root_trace(covariance[7:, 7:])),
         sigma_stations=station_sigmas(covariance, genes, problem.stations),
         agreement=agreement,
         on_bound=on_bound(model, genes),
@@ -89,13 +90,15 @@ def on_bound(model: Model, genes: Array) -> tuple[str, ...]:
     low, high = model.box
     with np.errstate(invalid="ignore"):
         margin = 1e-9 * np.where(np.isfinite(high - low), high - low, 1.0)
+    genes = tied(model, genes[None])[0]
     met = (high > low) & ((genes <= low + margin) | (genes >= high - margin))
     return tuple(GENES[i] for i in np.flatnonzero(met))
 
 
 def _centred(genes: Array, model: Model) -> Array:
     """Return genes with f, s_x, s_y off their bounds wherever the same alphas allow it."""
-    if not any(g in ("f", "s_x", "s_y") for g in on_bound(model, genes)):
+    low, high = model.search[:, :3]
+    if (((genes[:3] > low) & (genes[:3] < high)) | (low == high)).all():
         return genes
     alphas = genes[None, :1] * genes[None, 1:3]
     return np.concatenate([split_alphas(alphas, model.search)[0], genes[3:]])

@@ -1,20 +1,19 @@
 """Levenberg-Marquardt on many starts at once, inside the box, to zero gradient.
 
 Bounds are an active set: within a step, genes that would pass a bound are put on it and the others
-solved again, so that bounded optima are met as exactly as free ones. f, s_x, s_y share a null
-direction; the damping's floor keeps the step across it at zero.
+solved again, so that bounded optima are met as exactly as free ones.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from legato.calibration.cost import Flags, Indices, Model
+from legato.calibration.cost import Flags, Indices, Model, tied
 from legato.calibration.derivatives import normal_equations
 from legato.calibration.operators import wrapped
 from legato.geometry.transforms import Array
 
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e12
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-1, 1e-12, 1e12
 # Converged: the full step would lower the cost by less than this share, or this many px^2.
 RELATIVE_DECREASE, ABSOLUTE_DECREASE = 1e-13, 1e-22
 # Optima are the same where their costs are: 1e-6 of the cost is far below one sigma of any gene.
@@ -50,16 +49,17 @@ def refine(
     weights: Array | None = None,
     rounds: int = 100,
     enough: int | None = None,
+    ended: int = 0,
 ) -> Refined:
     """Return what Levenberg-Marquardt makes of starts (B, 11), each inside the model's box.
 
     `weights` (B, M) replace the model's, one row a start; a weight of zero leaves a mark out.
     Where `enough` is given, the rest is broken off once so many have converged to one cost that no
-    other start is below.
+    other start is below, and at least `ended` have come to an end anywhere.
     """
     free = _span(model.refined)
     box = model.box[:, free]
-    genes = np.clip(starts, *model.box)
+    genes = np.clip(tied(model, starts), *model.box)
     w = np.broadcast_to(model.weights if weights is None else weights, (len(genes), _marks(model)))
     value, hessian, gradient = normal_equations(model, genes, w, free)
     damping = np.full(len(genes), FIRST_DAMPING)
@@ -67,8 +67,9 @@ def refine(
     going = np.flatnonzero(np.isfinite(value))
     taken = 0
     while going.size and taken < rounds:
-        if enough is not None and _met(value, converged) >= enough:
-            break
+        if enough is not None and len(genes) - going.size >= max(enough, ended):
+            if _met(value, converged) >= enough:
+                break
         taken += 1
         now = genes[going]
         step, decrease = _step(now[:, free], box, hessian[going], gradient[going], damping[going])
@@ -76,12 +77,13 @@ def refine(
         trial[:, free] += step
         found = normal_equations(model, trial, w[going], free)
         better = found[0] <= value[going]
-        small = decrease <= RELATIVE_DECREASE * value[going] + ABSOLUTE_DECREASE
+        # Bounds can turn a step uphill: that proves nothing either, and damping mends it.
+        small = np.abs(decrease) <= RELATIVE_DECREASE * value[going] + ABSOLUTE_DECREASE
         won = going[better]
         genes[won] = trial[better]
         value[won], hessian[won], gradient[won] = (part[better] for part in found)
         damping[going] = np.clip(
-            damping[going] * np.where(better, 0.1, 8.0), LEAST_DAMPING, MOST_DAMPING
+            damping[going] * np.where(better, 0.1, 5.0), LEAST_DAMPING, MOST_DAMPING
         )
         # A small step under heavy damping proves nothing; rounding may refuse the very last one.
         done = small & (damping[going] <= 1e-2)

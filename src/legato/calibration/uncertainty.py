@@ -89,10 +89,20 @@ def _lens_jacobian(known: KnownIntrinsics, points: Array, genes: Array) -> Array
 
 
 def _inverse(matrix: Array) -> Array:
-    """Return the inverse of an information matrix whose parameters differ in unit."""
+    """Return the inverse of an information matrix whose parameters differ in unit.
+
+    Directions of which nothing is known get a variance that is huge, never a negative one.
+    """
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix * np.outer(scale, scale) + 1e-14 * np.eye(len(matrix))
-    return np.asarray(np.linalg.inv(scaled) * np.outer(scale, scale))
+    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    inner = (vectors / np.maximum(values, 1e-14)) @ vectors.T
+    return np.asarray(inner * np.outer(scale, scale))
+
+
+def root_trace(covariance: Array) -> Array:
+    """Return the root of the trace of covariances (..., D, D); infinite where rounding ate it."""
+    trace = np.trace(covariance, axis1=-2, axis2=-1)
+    return np.where(trace >= 0.0, np.sqrt(np.abs(trace)), np.inf)
 
 
 def station_sigmas(covariance: Array, genes: Array, stations: Array) -> Array:
@@ -102,7 +112,7 @@ def station_sigmas(covariance: Array, genes: Array, stations: Array) -> Array:
     turned = stations @ pose_of(genes)[:3, :3].T
     j = np.concatenate([-skew(turned), np.broadcast_to(np.eye(3), (len(stations), 3, 3))], axis=2)
     spread = j @ covariance[4:, 4:] @ np.swapaxes(j, 1, 2)
-    return np.asarray(np.sqrt(np.trace(spread, axis1=1, axis2=2)))
+    return root_trace(spread)
 
 
 def misfit(model: Model, genes: Array, weights: Array | None = None) -> tuple[float, int]:

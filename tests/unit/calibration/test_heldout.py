@@ -43,6 +43,45 @@ def test_a_mark_that_alone_leaves_the_plane_cannot_be_tested(scenes: Any) -> Non
     assert np.isfinite(rows["P2"].ratio)
 
 
+def test_a_known_camera_predicts_from_one_plane(scenes: Any) -> None:
+    """With known intrinsics the coplanar rest does give a pose: its prediction is fair."""
+    ratios = []
+    for seed in range(12):
+        scene = scenes.random(70 + seed, scenes.six_and_one)
+        s = solve(scene.known(), "hybrid", SETTINGS, np.random.default_rng(seed))
+        rows = {r.name: r for r in held_out(scene.known(), s)}
+        ratios.append(rows["P1"].ratio)
+        assert rows["P1"].sigma_px > 1.5 * min(r.sigma_px for r in rows.values())
+    assert np.sqrt(np.mean(np.square(ratios))) == pytest.approx(1.0, abs=0.45)
+
+
+def test_a_wrong_mark_off_the_plane_is_seen_by_a_known_camera(scenes: Any) -> None:
+    """Alone off the plane and 6 px off, it lies far from what the plane's pose predicts."""
+    scene = scenes.random(72, scenes.six_and_one)
+    pixels = scene.problem.pixels.copy()
+    pixels[0] += [6.0, 6.0]
+    problem = replace(scene.known(), pixels=pixels)
+    s = solve(problem, "hybrid", SETTINGS, np.random.default_rng(2))
+    rows = {r.name: r for r in held_out(problem, s)}
+    assert 4.0 < rows["P1"].ratio < np.inf
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_swapped_marks_of_the_face_are_not_explained_away(scenes: Any, known: bool) -> None:
+    """P1 taken for P8 leaves the fit out of the noise, and held-out marks far off."""
+    for seed in range(2):
+        scene = scenes.random(90 + seed, scenes.ten)
+        pixels = scene.problem.pixels.copy()
+        pixels[[0, 7]] = pixels[[7, 0]]
+        problem = replace(scene.known() if known else scene.problem, pixels=pixels)
+        rng = np.random.default_rng(seed)
+        s = solve(problem, "hybrid", SETTINGS, rng)
+        found = suspects(problem, s, SETTINGS, rng)
+        assert found.misfit > 5.0 * found.limit
+        assert max(r.ratio for r in held_out(problem, s)) > 10.0
+        assert not found.names or set(found.names) == {"P1", "P8"}
+
+
 @pytest.mark.parametrize("known", [True, False])
 def test_the_misprinted_mark_is_named(scenes: Any, known: bool) -> None:
     """With the paper's P10 the fit is out of the noise, and P10 alone explains it."""

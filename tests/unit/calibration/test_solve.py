@@ -49,6 +49,15 @@ def test_values_that_are_no_numbers_are_named(scenes: Any, value: float) -> None
         refuse(replace(problem, **{what: array}), f"{what} of P3")
 
 
+def test_intrinsics_of_another_picture_size_are_refused(scenes: Any) -> None:
+    """A camera calibrated at 640x480 says nothing about a picture of 768x576."""
+    scene = scenes.paper()
+    other = replace(scene.intrinsics, width=640, height=480)
+    refuse(scene.known(intrinsics=other), r"of pictures of 640x480 px, this one has 768x576")
+    small = replace(scene.known(intrinsics=other), size=(640, 480))
+    assert solve(small, "hybrid", EngineSettings(), np.random.default_rng(0)).names
+
+
 def test_double_names_are_refused(scenes: Any) -> None:
     """A mark given twice is refused by name."""
     problem = scenes.paper().problem
