@@ -102,6 +102,7 @@ class TeachMover:
         self._port: Port | None = None
         self._parser = ReplyParser()
         self._settled = False
+        self._owes = False  # whether the answer to an earlier read may still come
         self._in_doubt = False
         self._line: deque[tuple[float, str, bytes]] = deque(maxlen=KEPT)
 
@@ -192,23 +193,24 @@ class TeachMover:
                     raise
                 continue
             if isinstance(reply, Registers):
-                self._drain()
-                self._settled = True
+                # They may be the answer to an earlier read, with the last one's still to come.
+                slow = QUIET * BITS / self._settings.baud
+                self._drain(self._settings.reply_margin_s if self._owes else slow)
+                self._settled, self._owes = True, False
                 return
             if last:
                 raise self._unwelcome(reply, Read())
 
-    def _drain(self) -> None:
-        """Throw away what still comes until the line is quiet, or babbles beyond the margin."""
-        now = self._clock.monotonic()
-        give_up, heard = now + self._settings.reply_margin_s, now
-        pause = QUIET * BITS / self._settings.baud
+    def _drain(self, pause_s: float) -> None:
+        """Throw away what still comes until nothing has for so long, or it babbles on and on."""
+        heard = now = self._clock.monotonic()
+        give_up = now + pause_s + self._settings.reply_margin_s
         while now < give_up:
             data = self._receive()
             now = self._clock.monotonic()
             if data:
                 heard = now
-            elif now - heard >= pause:
+            elif now - heard >= pause_s:
                 return
 
     def _exchange(self, command: Command, takes_s: float = 0.0) -> Reply:
@@ -224,6 +226,7 @@ class TeachMover:
             while (reply := self._parser.next_event()) is None:
                 if self._clock.monotonic() > deadline:
                     self._settled = False
+                    self._owes = self._owes or isinstance(command, Read)
                     raise DeviceError(
                         Cause.ARM_TIMEOUT,
                         f"no reply to {data!r} within {allowed:.2f} s",

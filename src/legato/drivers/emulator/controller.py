@@ -145,6 +145,9 @@ class Emulator:
         if Kind.LOST_STEPS in struck and isinstance(self._arm, Slips):
             loss = struck[Kind.LOST_STEPS]
             self._arm.slip(loss.motor, int(loss.by or 0))
+        if Kind.RESTART in struck:
+            self._arm.zero()
+            self._program.clear()
         if Kind.REFUSED in struck:
             return Refused()
         try:

@@ -24,6 +24,7 @@ class Kind(StrEnum):
     REFUSED = "0"
     PENDANT = "2"
     HANG_UP = "hang-up"
+    RESTART = "restart"
     LOST_STEPS = "lost-steps"
     STUCK_OPEN = "stuck-open"
     STUCK_CLOSED = "stuck-closed"
@@ -36,6 +37,7 @@ MEANINGS = {
     Kind.REFUSED: "the command is answered 0 and not carried out",
     Kind.PENDANT: "STOP is pressed during the command: it is broken off and answered 2",
     Kind.HANG_UP: "the line hangs up, and is back BY seconds later (default never)",
+    Kind.RESTART: "the arm is switched off and on before the command: its registers are zero",
     Kind.LOST_STEPS: "MOTOR (default 2) misses its next BY half-steps (default 60)",
     Kind.STUCK_OPEN: "the grip switch reads open from then on",
     Kind.STUCK_CLOSED: "the grip switch reads closed from then on",

@@ -91,16 +91,32 @@ class Renderer:
         world = np.asarray(camera_from_world, dtype=float)
         key = pose.tobytes() + world.tobytes()
         if key != self._key:
-            sharp = self._scene(pose, world)
+            sharp = self.sharp(pose, world)
             self._clean = np.asarray(_blurred(sharp * 255.0, self._blur), dtype=np.float32)
             self._key = key
         return self._clean
 
-    def _scene(self, pose: Array, world: Array) -> NDArray[np.float32]:
-        """Return the sharp picture as reflectance times light, 0 to about 1."""
-        object_from_world = invert(pose) @ world
-        lamp = object_from_world[:3, :3] @ self._light.direction()
-        picture = self._surroundings.picture(world, object_from_world)
+    def scenery(
+        self, camera_from_object: ArrayLike, camera_from_world: ArrayLike
+    ) -> NDArray[np.float32]:
+        """Return what lies around the leg, with its shadow, as reflectance times light."""
+        world = np.asarray(camera_from_world, dtype=float)
+        return self._surroundings.picture(world, invert(camera_from_object) @ world)
+
+    def sharp(
+        self,
+        camera_from_object: ArrayLike,
+        camera_from_world: ArrayLike,
+        behind: NDArray[np.float32] | None = None,
+    ) -> NDArray[np.float32]:
+        """Return the sharp picture (H, W) as reflectance times light, 0 to about 1.
+
+        The leg is laid over `behind`, by default its own scenery.
+        """
+        pose = np.asarray(camera_from_object, dtype=float)
+        world = np.asarray(camera_from_world, dtype=float)
+        lamp = (invert(pose) @ world)[:3, :3] @ self._light.direction()
+        picture = self.scenery(pose, world) if behind is None else behind.copy()
         rows, columns = self._box(pose)
         part = np.zeros(picture.shape, dtype=np.int8)
         for top in range(rows.start, rows.stop, BAND_ROWS):
