@@ -17,7 +17,10 @@ from legato.geometry.transforms import Array, apply, rotation_from_vector, trans
 from legato.vision.saddle import Candidates
 from legato.vision.view import SMALLEST_FACING
 
-MOST_TRIPLES = 1500  # ordered triples of candidates tried for one triple of marks
+MOST_TRIPLES = 2000  # ordered triples of candidates tried for one triple of marks
+LEAST_NEAR = 7  # neighbours that each candidate is combined with
+DRAWN_TRIPLES = 300  # of far-off candidates where only neighbours are tried
+SIDES = (7.0, 200.0)  # px that a mark's side measures in a picture
 REACH = 24.0  # px at width 768 within which a pose from wrong intrinsics still counts
 EDGE_TOLERANCE = np.radians(18.0)
 TURNS = np.radians([-12.0, -6.0, 0.0, 6.0, 12.0])  # a hand pastes marks on this straight
@@ -53,8 +56,12 @@ class Target:
         return np.asarray((away * self.normals).sum(-1) / np.linalg.norm(away, axis=-1))
 
 
-def mark_triples(target: Target, most: int) -> list[tuple[int, ...]]:
-    """Return at most so many triples of marks, large ones first, each mark coming early."""
+def mark_triples(target: Target, most: int, crowded: bool = False) -> list[tuple[int, ...]]:
+    """Return at most so many triples of marks, the most telling first, each mark coming early.
+
+    Large ones tell most. Where places are `crowded` with candidates, compact ones: their images
+    are neighbours.
+    """
     triples = np.array(list(combinations(range(len(target.points)), 3)))
     p = target.points[triples]
     area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=-1) / 2.0
@@ -65,6 +72,9 @@ def mark_triples(target: Target, most: int) -> list[tuple[int, ...]]:
     )
     # Marks that face different ways are seldom seen together, and slivers give no pose.
     value = np.sqrt(area) * (0.4 + np.maximum(together, 0.0))
+    if crowded:
+        longest = np.linalg.norm(p - p[:, [1, 2, 0]], axis=-1).max(axis=1)
+        value = value / longest**2
     used = np.zeros(len(target.points))
     order = []
     for _ in range(min(most, len(triples))):
@@ -75,13 +85,24 @@ def mark_triples(target: Target, most: int) -> list[tuple[int, ...]]:
     return order
 
 
-def candidate_triples(n: int, rng: np.random.Generator) -> NDArray[np.intp]:
-    """Return ordered triples (T, 3) of n candidates: all of them, or a draw where they are many."""
-    if n * (n - 1) * (n - 2) <= MOST_TRIPLES:
-        a, b, c = np.meshgrid(*[np.arange(n)] * 3, indexing="ij")
-        every = np.stack([a.ravel(), b.ravel(), c.ravel()], axis=-1)
+def crowded(n: int) -> bool:
+    """Say whether so many candidates have more ordered triples than can be tried."""
+    return n * (n - 1) * (n - 2) > MOST_TRIPLES
+
+
+def candidate_triples(pixels: Array, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Return ordered triples (T, 3) of candidates (N, 2): all, or of neighbours and a draw."""
+    n = len(pixels)
+    if not crowded(n):
+        every = np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     else:
-        every = rng.integers(0, n, size=(MOST_TRIPLES, 3))
+        near = max(LEAST_NEAR, int(0.5 + np.sqrt(0.25 + MOST_TRIPLES / n)))
+        away = np.linalg.norm(pixels[:, None] - pixels, axis=-1)
+        neighbours = np.argsort(away, axis=1, kind="stable")[:, 1 : near + 1]
+        j, k = (x.ravel() for x in np.meshgrid(np.arange(near), np.arange(near)))
+        first = np.repeat(np.arange(n), near * near)
+        every = np.stack([first, neighbours[:, j].ravel(), neighbours[:, k].ravel()], axis=-1)
+        every = np.concatenate([every, rng.integers(0, n, size=(DRAWN_TRIPLES, 3))])
     i, j, k = every.T
     return np.asarray(every[(i != j) & (j != k) & (i != k)])
 
@@ -106,7 +127,10 @@ def poses_of(
         return np.zeros((0, 4, 4))
     r = np.array(rotations, dtype=float)[..., 0]
     t = np.array(translations, dtype=float)[..., 0]
-    good = np.isfinite(r).all(axis=1) & np.isfinite(t).all(axis=1) & (t[:, 2] > 0.0)
+    near, far = (nominal.alpha_u * target.leg.mark_size / side for side in SIDES[::-1])
+    depth = t[:, 2]  # of the big face: marks lie within a length of it
+    good = np.isfinite(r).all(axis=1) & np.isfinite(t).all(axis=1)
+    good &= (depth > near) & (depth < far + target.leg.length)
     poses = transform(rotation_from_vector(r[good]), t[good])
     seen = target.facing(poses)[:, list(triple)].min(axis=1) > SMALLEST_FACING
     return np.asarray(poses[seen])

@@ -5,7 +5,7 @@ explains: marks that face the camera near candidates whose edges run as a pasted
 The best poses are fitted, assigned one to one, and freed of their worst marks.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -17,6 +17,7 @@ from legato.geometry.transforms import Array
 from legato.vision.hypotheses import (
     Target,
     candidate_triples,
+    crowded,
     edges_fit,
     mark_triples,
     most_telling,
@@ -30,6 +31,7 @@ from legato.vision.view import SMALLEST_FACING, View, fit_view
 LEAST_MARKS = 5  # named marks; fewer agree with a wrong pose too easily
 ENOUGH_MARKS = 7  # so many never agree by chance: the search ends
 ROUNDS = 16  # triples of marks tried
+MOST_CONFIRMED = 6  # labellings of few marks that are held against the picture
 MOST_ROUNDS, BUDGET = 64, 16000  # more of them where candidates are few: their product
 STRONG = 0.3  # of the fourth strongest contrast
 RADII = (30.0, 14.0, 7.0, 5.0)  # px at width 768 of the successive assignments
@@ -38,20 +40,23 @@ LARGEST_RMS = 1.4  # px at width 768 of a consistent set
 
 @dataclass(frozen=True)
 class Labelling:
-    """The view, the candidate (index) of each named mark, and their misfit in px."""
+    """The view, the candidate (index) of each named mark, their misfit in px, and a worth.
+
+    The worth is more for more marks named, fewer missing and a smaller misfit.
+    """
 
     view: View
     chosen: dict[str, int]
     rms: float
+    worth: float
 
     def indices(self, leg: Leg) -> dict[int, int]:
         """Return the candidates by the marks' places in the leg's order."""
         names = leg.names()
         return {names.index(name): k for name, k in self.chosen.items()}
 
-    def worth(self, missing: int) -> float:
-        """Return more for more marks named, fewer missing and a smaller misfit."""
-        return len(self.chosen) - 0.5 * missing - 0.2 * self.rms
+
+Confirm = Callable[[Labelling], bool]
 
 
 def label(
@@ -61,12 +66,14 @@ def label(
     rng: np.random.Generator,
     prior: View | None = None,
     rounds: int | None = None,
+    confirm: Confirm = lambda _: True,
 ) -> Labelling:
     """Return the labelling that explains most marks of one leg.
 
     `nominal` may be off by a tenth in alpha and some 20 px in the principal point. `prior` is a
-    view known to be near, tried first; `rounds` sets how many triples of marks are tried. Raises
-    MarksNotFound where too few marks agree or two labellings explain the picture equally well.
+    view known to be near, tried first; `rounds` sets how many triples of marks are tried;
+    `confirm` says whether the picture bears a labelling out. Raises MarksNotFound where too few
+    marks agree or two labellings explain the picture equally well.
     """
     if len(candidates) < LEAST_MARKS:
         raise MarksNotFound(
@@ -75,9 +82,8 @@ def label(
             "see that the leg's marks are in the picture, in focus, lit and not covered",
             len(candidates),
         )
-    target = Target.of(leg)
-    found = _strong_first(candidates, target, nominal, rng, prior, rounds)
-    if not found:
+    best, found = _first_confirmed(candidates, Target.of(leg), nominal, rng, prior, rounds, confirm)
+    if best is None:
         raise MarksNotFound(
             f"none of the poses tried explains {LEAST_MARKS} of the {len(candidates)} places "
             "that look like marks",
@@ -85,8 +91,7 @@ def label(
             "this camera's, and that at least seven marks are in sight; or give picks",
             len(candidates),
         )
-    best = found[0][1]
-    rival = next((r for worth, r in found[1:] if _rivals(found[0], (worth, r))), None)
+    rival = next((r for r in found if _rivals(best, r) and confirm(r)), None)
     if rival is not None:
         raise MarksNotFound(
             f"two labellings explain the picture: {_text(best)} and {_text(rival)}",
@@ -94,6 +99,30 @@ def label(
             len(candidates),
         )
     return best
+
+
+def _first_confirmed(
+    candidates: Candidates,
+    target: Target,
+    nominal: Intrinsics,
+    rng: np.random.Generator,
+    prior: View | None,
+    rounds: int | None,
+    confirm: Confirm,
+) -> tuple[Labelling | None, list[Labelling]]:
+    """Return the first labelling that names enough and is confirmed, else the best confirmed.
+
+    And with it all that were found, by falling worth.
+    """
+    found: list[Labelling] = []
+    seen: list[dict[str, int]] = []
+    for found in _rounds(candidates, target, nominal, rng, prior, rounds):
+        best = found[0]
+        if len(best.chosen) >= ENOUGH_MARKS and best.chosen not in seen:
+            seen.append(best.chosen)
+            if confirm(best):
+                return best, found
+    return next((r for r in found[:MOST_CONFIRMED] if confirm(r)), None), found
 
 
 def view_of_named(named: Mapping[str, Array], leg: Leg, nominal: Intrinsics) -> View | None:
@@ -124,28 +153,29 @@ def view_of_named(named: Mapping[str, Array], leg: Leg, nominal: Intrinsics) -> 
     return fit_view(best[1], nominal, points[near], pixels[near], 0.7, rounds=20)[0]
 
 
-def _strong_first(
+def _rounds(
     candidates: Candidates,
     target: Target,
     nominal: Intrinsics,
     rng: np.random.Generator,
     prior: View | None,
     rounds: int | None,
-) -> list[tuple[float, Labelling]]:
-    """Return labellings by falling worth, of the strong candidates alone where they suffice.
+) -> Iterator[list[Labelling]]:
+    """Yield the labellings so far by falling worth: of the strong candidates first, then of all.
 
     A wood's figure or a distant floor shows many weak saddles; marks differ less among themselves.
     """
     limit = STRONG * float(np.sort(candidates.contrast)[-4])
     strong = np.flatnonzero(candidates.contrast >= limit)
+    found: list[Labelling] = []
     if LEAST_MARKS < len(strong) < len(candidates):
-        found = _search(candidates.take(strong), target, nominal, rng, prior, rounds)
-        if found and len(found[0][1].chosen) > LEAST_MARKS:
-            return [
-                (worth, replace(x, chosen={n: int(strong[k]) for n, k in x.chosen.items()}))
-                for worth, x in found
+        for part in _search(candidates.take(strong), target, nominal, rng, prior, rounds):
+            found = [
+                replace(x, chosen={n: int(strong[k]) for n, k in x.chosen.items()}) for x in part
             ]
-    return _search(candidates, target, nominal, rng, prior, rounds)
+            yield found
+    for part in _search(candidates, target, nominal, rng, prior, rounds):
+        yield _distinct(found + part)
 
 
 def _search(
@@ -155,19 +185,22 @@ def _search(
     rng: np.random.Generator,
     prior: View | None,
     rounds: int | None,
-) -> list[tuple[float, Labelling]]:
-    """Return labellings by falling worth; stops when one names enough."""
-    found: list[tuple[float, Labelling]] = []
+) -> Iterator[list[Labelling]]:
+    """Yield what was found after each triple of marks, by falling worth."""
+    found: list[Labelling] = []
     tried: list[dict[int, int]] = []
     if prior is not None:
         expected = _settle(prior, candidates, target, nominal)
         found += [expected] if expected is not None else []
+        if found:
+            yield found
     pixels = pinhole_pixels(nominal, candidates.pixels)
-    for triple in mark_triples(target, _affordable(len(candidates)) if rounds is None else rounds):
-        if found and len(found[0][1].chosen) >= ENOUGH_MARKS:
-            break
-        chosen = candidate_triples(len(candidates), rng)
+    many = crowded(len(candidates))
+    most = _affordable(len(candidates)) if rounds is None else rounds
+    for triple in mark_triples(target, most, many):
+        chosen = candidate_triples(candidates.pixels, rng)
         poses = poses_of(target, triple, chosen, pixels, nominal)
+        before = len(found)
         for pose in most_telling(poses, candidates, target, nominal):
             view = View(nominal, pose)
             first = _assigned(view, candidates, target, RADII[0] * scale_of(nominal))
@@ -177,10 +210,10 @@ def _search(
             tried.append(first)
             if settled is not None:
                 found.append(settled)
-                tried.append(settled[1].indices(target.leg))
-        found.sort(key=lambda item: -item[0])
-        found = _distinct(found)
-    return found
+                tried.append(settled.indices(target.leg))
+        if len(found) > before:
+            found = _distinct(found)
+            yield found
 
 
 def _affordable(n: int) -> int:
@@ -190,7 +223,7 @@ def _affordable(n: int) -> int:
 
 def _settle(
     view: View, candidates: Candidates, target: Target, nominal: Intrinsics
-) -> tuple[float, Labelling] | None:
+) -> Labelling | None:
     """Assign, fit and drop until the named marks agree; None where too few do."""
     scale = scale_of(nominal)
     chosen: dict[int, int] = {}
@@ -208,10 +241,10 @@ def _settle(
     if len(chosen) < LEAST_MARKS or rms > LARGEST_RMS * scale:
         return None
     names = target.leg.names()
-    labelling = Labelling(view, {names[m]: n for m, n in sorted(chosen.items())}, rms)
+    named = {names[m]: n for m, n in sorted(chosen.items())}
     unseen = view.unseen(target.leg, 10.0)
-    missing = sum(1 for n in names if n not in unseen and n not in labelling.chosen)
-    return labelling.worth(missing), labelling
+    missing = sum(1 for n in names if n not in unseen and n not in named)
+    return Labelling(view, named, rms, len(named) - 0.5 * missing - 0.2 * rms)
 
 
 def _assigned(view: View, candidates: Candidates, target: Target, radius: float) -> dict[int, int]:
@@ -240,11 +273,11 @@ def _refit(
     return fit_view(view, nominal, points, pixels, 0.7, rounds=6)
 
 
-def _distinct(found: list[tuple[float, Labelling]]) -> list[tuple[float, Labelling]]:
-    """Return the labellings without repetitions."""
-    kept: dict[tuple[tuple[str, int], ...], tuple[float, Labelling]] = {}
-    for item in found:
-        kept.setdefault(tuple(item[1].chosen.items()), item)
+def _distinct(found: list[Labelling]) -> list[Labelling]:
+    """Return the labellings by falling worth, without repetitions."""
+    kept: dict[tuple[tuple[str, int], ...], Labelling] = {}
+    for item in sorted(found, key=lambda x: -x.worth):
+        kept.setdefault(tuple(item.chosen.items()), item)
     return list(kept.values())
 
 
@@ -253,11 +286,11 @@ def _contained(assigned: dict[int, int], tried: list[dict[int, int]]) -> bool:
     return any(assigned.items() <= earlier.items() for earlier in tried)
 
 
-def _rivals(best: tuple[float, Labelling], other: tuple[float, Labelling]) -> bool:
+def _rivals(best: Labelling, other: Labelling) -> bool:
     """Say whether another labelling contradicts the best and explains as much."""
-    names = {n: k for k, n in best[1].chosen.items()}
-    contradictions = sum(1 for k, n in other[1].chosen.items() if names.get(n, k) != k)
-    return contradictions >= 3 and other[0] > best[0] - 0.75
+    names = {n: k for k, n in best.chosen.items()}
+    contradictions = sum(1 for k, n in other.chosen.items() if names.get(n, k) != k)
+    return contradictions >= 3 and other.worth > best.worth - 0.75
 
 
 def _text(labelling: Labelling) -> str:

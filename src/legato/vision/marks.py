@@ -6,11 +6,16 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class FoundMark:
-    """One mark's centre in px and the standard deviation of each coordinate."""
+    """One mark's centre in px and the standard deviation of each coordinate.
+
+    `size` is its side over what the leg model and its place say, with a standard deviation.
+    """
 
     u: float
     v: float
     sigma: float
+    size: float = 1.0
+    size_sigma: float = float("inf")
 
 
 @dataclass(frozen=True)

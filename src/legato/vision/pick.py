@@ -13,12 +13,16 @@ from legato.geometry.projection import Intrinsics
 from legato.geometry.transforms import Array, apply
 from legato.vision.label import Labelling, label, view_of_named
 from legato.vision.marks import FoundMark, MarksNotFound, Picking
+from legato.vision.overlay import NotThere
 from legato.vision.picture import Grey
-from legato.vision.refine import NotThere, Refined, noise_of, polish_mark, refine_mark
+from legato.vision.refine import Refined, noise_of, polish_mark, refine_mark
 from legato.vision.saddle import Candidates, find_saddles
 from legato.vision.view import View, fit_view
 
 LEAST_FOUND = 6  # measured marks
+LEAST_SECOND = 5  # marks of a second leg
+SECOND_ROUNDS = 6  # triples of marks tried for it
+OTHER = 5.0  # px from every mark of the first leg
 LARGEST_MISFIT = 0.8  # mm across the line of sight: marks are pasted by hand
 LEAST_LIMIT = 1.2  # px: what a view may be wrong by, however far the leg
 EDGE = 5.0  # px a mark's centre keeps from the picture's edge
@@ -36,21 +40,53 @@ def find_marks(
     to be near. Raises MarksNotFound with what to do.
     """
     _check_size(image, nominal)
-    rng = np.random.default_rng(seed)
     candidates = find_saddles(image)
-    labelling = label(candidates, leg, nominal, rng, prior)
-    _check_single(candidates, labelling, leg, nominal, rng)
-    starts = {name: candidates.pixels[k] for name, k in labelling.chosen.items()}
-    found, missing = _measured(image, leg, nominal, labelling.view, starts)
-    if len(found) < LEAST_FOUND:
-        raise MarksNotFound(
+    rng = np.random.default_rng(seed)
+    measured = _Measurements(image, leg, nominal, candidates)
+    try:
+        labelling = label(candidates, leg, nominal, rng, prior, confirm=measured.confirm)
+    except MarksNotFound:
+        if measured.done and max(len(found) for _, found, _ in measured.done) < LEAST_FOUND:
+            raise measured.too_few() from None
+        raise
+    found, missing = measured.of(labelling)
+    _check_single(candidates, labelling, found, measured, rng)
+    return Picking({n: _found(r) for n, r in found.items()}, missing, len(candidates), "automatic")
+
+
+class _Measurements:
+    """What templates find of labellings, each measured once."""
+
+    def __init__(self, image: Grey, leg: Leg, nominal: Intrinsics, candidates: Candidates) -> None:
+        self.image, self.leg, self.nominal, self.candidates = image, leg, nominal, candidates
+        self.done: list[tuple[Labelling, dict[str, Refined], dict[str, str]]] = []
+
+    def of(
+        self, labelling: Labelling, candidates: Candidates | None = None
+    ) -> tuple[dict[str, Refined], dict[str, str]]:
+        """Return the marks measured from a labelling (of other candidates), and those missing."""
+        for known, found, missing in self.done:
+            if known is labelling:
+                return found, missing
+        places = (candidates or self.candidates).pixels
+        starts = {name: places[k] for name, k in labelling.chosen.items()}
+        found, missing = _measured(self.image, self.leg, self.nominal, labelling.view, starts)
+        self.done.append((labelling, found, missing))
+        return found, missing
+
+    def confirm(self, labelling: Labelling) -> bool:
+        """Say whether enough of a labelling's marks look like marks seen from there."""
+        return len(self.of(labelling)[0]) >= LEAST_FOUND
+
+    def too_few(self) -> MarksNotFound:
+        """Return the error of the labelling that came nearest."""
+        _, found, missing = max(self.done, key=lambda item: len(item[1]))
+        return MarksNotFound(
             f"only {len(found)} marks can be measured ({_reasons(missing)}), "
             f"{LEAST_FOUND} are needed",
             "see that marks are lit, in focus and not covered, or give picks",
-            len(candidates),
+            len(self.candidates),
         )
-    marks = {n: FoundMark(float(r.pixel[0]), float(r.pixel[1]), r.sigma) for n, r in found.items()}
-    return Picking(marks, missing, len(candidates), "automatic")
 
 
 def snap_picks(
@@ -76,7 +112,7 @@ def snap_picks(
         found, _ = _measured(image, leg, nominal, view, snapped)
         for n, r in found.items():
             if n in snapped and np.linalg.norm(r.pixel - snapped[n]) < 3.0:
-                marks[n] = FoundMark(float(r.pixel[0]), float(r.pixel[1]), r.sigma)
+                marks[n] = _found(r)
     for n in leg.names():
         if n not in picks:
             missing[n] = "not picked"
@@ -118,6 +154,12 @@ def _measured(
     }
 
 
+def _found(r: Refined) -> FoundMark:
+    """Return a refined mark as picking gives it."""
+    u, v = (float(x) for x in r.pixel)
+    return FoundMark(u, v, r.sigma, r.size.ratio, r.size.sigma)
+
+
 def _agreed(
     leg: Leg,
     nominal: Intrinsics,
@@ -156,25 +198,35 @@ def _check_size(image: Grey, nominal: Intrinsics) -> None:
 def _check_single(
     candidates: Candidates,
     labelling: Labelling,
-    leg: Leg,
-    nominal: Intrinsics,
+    found: Mapping[str, Refined],
+    measured: _Measurements,
     rng: np.random.Generator,
 ) -> None:
     """Refuse a picture whose other candidates make up a second leg."""
+    own = np.array([r.pixel for r in found.values()])
     taken = set(labelling.chosen.values())
-    rest = np.array([k for k in range(len(candidates)) if k not in taken], dtype=np.intp)
-    if len(rest) < LEAST_FOUND:
+    away = np.linalg.norm(candidates.pixels[:, None] - own, axis=-1).min(axis=1)
+    free = [k for k in range(len(candidates)) if k not in taken and away[k] > OTHER]
+    rest = candidates.take(np.array(free, dtype=np.intp))
+    if len(rest) < LEAST_SECOND:
         return
+
+    def another(other: Labelling) -> bool:
+        places = [r.pixel for r in measured.of(other, rest)[0].values()]
+        apart = [float(np.linalg.norm(own - p, axis=-1).min()) > OTHER for p in places]
+        return sum(apart) >= LEAST_SECOND
+
     try:
-        other = label(candidates.take(rest), leg, nominal, rng, rounds=4)
+        other = label(
+            rest, measured.leg, measured.nominal, rng, rounds=SECOND_ROUNDS, confirm=another
+        )
     except MarksNotFound:
         return
-    if len(other.chosen) >= LEAST_FOUND:
-        raise MarksNotFound(
-            f"two legs are in sight, with {len(labelling.chosen)} and {len(other.chosen)} marks",
-            "leave one leg model in the picture",
-            len(candidates),
-        )
+    raise MarksNotFound(
+        f"two legs are in sight, with {len(found)} and {len(other.chosen)} marks",
+        "leave one leg model in the picture",
+        len(candidates),
+    )
 
 
 def _snapped(

@@ -42,7 +42,7 @@ class Candidates:
         return Candidates(self.pixels[chosen], self.contrast[chosen], self.edges[chosen])
 
 
-def find_saddles(image: Grey, most: int = 40) -> Candidates:
+def find_saddles(image: Grey, most: int = 80) -> Candidates:
     """Return at most `most` candidates of a grey picture (H, W), to a few tenths of a pixel.
 
     A large picture is searched at its own scale and at that of one 768 px wide, since marks may

@@ -4,7 +4,7 @@ Curvature, obliquity and lens distortion come from the view; shift, turn and blu
 without another ray being cast.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from legato.geometry.leg import Leg
 from legato.geometry.projection import undistort
-from legato.geometry.raycast import BIG_FACE, SIDE, cast, object_rays
+from legato.geometry.raycast import BIG_FACE, SIDE, object_rays, points_on
 from legato.geometry.transforms import Array
 from legato.vision.view import View
 
 PAD = 6  # px around the mark's outline
 LARGEST_PATCH = 160  # px; larger marks are measured in their middle
 BLUR_STEP = 0.1  # relative
+FAR = 1e3  # mm beside a mark: no pattern is there
 
 
 Plane = NDArray[np.float32]
@@ -29,9 +30,9 @@ class Template:
     """A mark's patch of `shape` (h, w) px whose first pixel is `corner` (u, v).
 
     Each pixel has `fine` x `fine` rays. `along` and `around` (h n, w n) are their developed
-    coordinates on the mark, NaN beside its surface; `slopes` are the derivatives of both to the
-    fine grid's columns and rows: along by column, along by row, around by column, around by row.
-    `half` is half the mark's side.
+    coordinates on the mark, FAR beside its surface, which `surface` tells by 0; `slopes` are the
+    derivatives of both to the fine grid's columns and rows: along by column, along by row, around
+    by column, around by row. `half` is half the mark's side.
     """
 
     corner: tuple[int, int]
@@ -40,7 +41,12 @@ class Template:
     half: float
     along: Plane
     around: Plane
+    surface: Plane
     slopes: tuple[Plane, Plane, Plane, Plane]
+
+    def scaled(self, by: float) -> "Template":
+        """Return the template of a mark so many times as large."""
+        return replace(self, half=self.half * by)
 
     def pattern(self, shift: Array, turn: float) -> tuple[Plane, Plane]:
         """Return the sharp checker in [-1, 1] and the coverage by paper in [0, 1], fine grid.
@@ -55,8 +61,8 @@ class Template:
         around = self.around - (du * bu + dv * bv)
         first = self._edge(c * along + s * around, c * au + s * bu, c * av + s * bv)
         second = self._edge(c * around - s * along, c * bu - s * au, c * bv - s * av)
-        inside = np.nan_to_num(first[1] * second[1])
-        return np.nan_to_num(first[0] * second[0]) * inside, inside
+        inside = first[1] * second[1]
+        return first[0] * second[0] * inside, inside
 
     def _edge(self, own: Plane, by_column: Plane, by_row: Plane) -> tuple[Plane, Plane]:
         """Return the side of the middle line, -1 to 1, and the coverage along one coordinate."""
@@ -96,9 +102,22 @@ def make_template(leg: Leg, view: View, name: str, fine: int) -> Template | None
     if w < 8 or h < 8:
         return None
     along, around = _developed(leg, view, name, (u0, v0), (h, w), fine)
-    by_row, by_column = np.gradient(along), np.gradient(around)
-    slopes = (by_row[1], by_row[0], by_column[1], by_column[0])
-    return Template((u0, v0), (h, w), fine, half, along, around, slopes)
+    slopes = [difference(x, axis) for x in (along, around) for axis in (1, 0)]
+    off = ~np.isfinite(along + sum(slopes))
+    for plane, value in zip((along, around, *slopes), (FAR, FAR, 1.0, 0.0, 0.0, 1.0), strict=True):
+        plane[off] = value
+    surface = np.where(off, np.float32(0.0), np.float32(1.0))
+    au, av, bu, bv = slopes
+    return Template((u0, v0), (h, w), fine, half, along, around, surface, (au, av, bu, bv))
+
+
+def difference(plane: Plane, axis: int) -> Plane:
+    """Return the central difference along an axis, one-sided at the ends."""
+    out = np.empty_like(plane)
+    p, q = (plane, out) if axis == 0 else (plane.T, out.T)
+    q[1:-1] = (p[2:] - p[:-2]) * np.float32(0.5)
+    q[0], q[-1] = p[1] - p[0], p[-1] - p[-2]
+    return out
 
 
 def _developed(
@@ -110,9 +129,7 @@ def _developed(
     v = (corner[1] + np.arange(shape[0])[:, None] + offset).ravel()
     pixels = np.stack(np.meshgrid(u, v), axis=-1)
     normalised = undistort(view.intrinsics, pixels)
-    hits = cast(leg, *object_rays(view.camera_from_object, normalised))
-    own = leg.mark_coordinates(name, hits.points)
     part = BIG_FACE if leg.on_face(name) else SIDE
-    own[hits.part != part] = np.nan
-    flat = own.astype(np.float32)
+    points = points_on(leg, part, *object_rays(view.camera_from_object, normalised))
+    flat = leg.mark_coordinates(name, points).astype(np.float32)
     return np.ascontiguousarray(flat[..., 0]), np.ascontiguousarray(flat[..., 1])

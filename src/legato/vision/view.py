@@ -6,13 +6,14 @@ predicts where marks lie and how they look; the pose that an arm follows is cali
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
 from legato.geometry.leg import Leg
-from legato.geometry.projection import Intrinsics, distort, project
+from legato.geometry.projection import Intrinsics, project
 from legato.geometry.raycast import facing
-from legato.geometry.transforms import Array, apply, rotation_from_vector, transform
+from legato.geometry.transforms import Array
 
 SIGMA_ALPHA = 0.06  # of alpha
 SIGMA_ASPECT = 0.01  # of alpha_v / alpha_u
@@ -102,32 +103,29 @@ def _prior(now: Intrinsics, nominal: Intrinsics) -> Array:
 def _jacobian(view: View, nominal: Intrinsics, points: Array, weight: Array) -> Array:
     """Return d residual / d (rotation, translation, log alpha, log aspect, u0, v0)."""
     i, pose = view.intrinsics, view.camera_from_object
-    camera = apply(pose, points)
-    turned = camera - pose[:3, 3]
-    depth = np.maximum(camera[:, 2], 1e-3)
-    n = camera[:, :2] / depth[:, None]
-    r2 = (n * n).sum(axis=-1)
+    x, y, z = pose[:3, :3] @ points.T
+    tx, ty, tz = pose[:3, 3]
+    depth = np.maximum(z + tz, 1e-3)
+    n = np.stack([(x + tx) / depth, (y + ty) / depth])
+    r2 = n[0] * n[0] + n[1] * n[1]
     # Radial terms enter through the local scale only: enough for a step to go downhill.
-    scale = 1.0 + r2 * (i.k1 + r2 * i.k2)
-    per_n = scale[:, None] * [i.alpha_u, i.alpha_v]
-    zero = np.zeros_like(depth)
-    du = np.stack([1.0 / depth, zero, -n[:, 0] / depth], axis=-1) * per_n[:, :1]
-    dv = np.stack([zero, 1.0 / depth, -n[:, 1] / depth], axis=-1) * per_n[:, 1:]
-    position = np.stack([du, dv], axis=1)
-    jacobian = np.zeros((len(points), 2, 10))
-    jacobian[:, :, :3] = np.cross(turned[:, None, :], position)
-    jacobian[:, :, 3:6] = position
-    arm = distort(i, n) - [i.u0, i.v0]
-    jacobian[:, :, 6] = arm
-    jacobian[:, :, 7] = arm * [-0.5, 0.5]
-    jacobian[:, 0, 8] = 1.0
-    jacobian[:, 1, 9] = 1.0
-    jacobian *= weight[:, None, None]
+    scale = (1.0 + r2 * (i.k1 + r2 * i.k2)) * weight
+    whole = np.zeros((2 * len(points) + 4, 10))
+    jacobian = whole[:-4].reshape(len(points), 2, 10)
+    for k, alpha in enumerate((i.alpha_u, i.alpha_v)):
+        a = scale * alpha / depth
+        b = -a * n[k]
+        # The derivative by the place (a, 0, b) or (0, a, b); by the turn, the arm crossed with it.
+        px, py = (a, 0.0) if k == 0 else (0.0, a)
+        for column, value in enumerate((y * b - z * py, z * px - x * b, x * py - y * px)):
+            jacobian[:, k, column] = value
+        jacobian[:, k, 3 + k], jacobian[:, k, 5] = a, b
+        arm = scale * alpha * n[k]
+        jacobian[:, k, 6], jacobian[:, k, 7] = arm, (k - 0.5) * arm
+        jacobian[:, k, 8 + k] = weight
     centre = SIGMA_CENTRE * max(1.0, nominal.width / 768.0)
-    prior = np.diag([1 / SIGMA_ALPHA, 1 / SIGMA_ASPECT, 1 / centre, 1 / centre])
-    return np.concatenate(
-        [jacobian.reshape(-1, 10), np.concatenate([np.zeros((4, 6)), prior], axis=1)]
-    )
+    whole[-4:, 6:] = np.diag([1 / SIGMA_ALPHA, 1 / SIGMA_ASPECT, 1 / centre, 1 / centre])
+    return whole
 
 
 def _moved(view: View, nominal: Intrinsics, step: Array) -> View:
@@ -145,5 +143,7 @@ def _moved(view: View, nominal: Intrinsics, step: Array) -> View:
         u0=float(u0),
         v0=float(v0),
     )
-    rotation = rotation_from_vector(np.clip(step[:3], -0.5, 0.5)) @ pose[:3, :3]
-    return View(moved, transform(rotation, pose[:3, 3] + step[3:6]))
+    after = pose.copy()
+    after[:3, :3] = cv2.Rodrigues(np.clip(step[:3], -0.5, 0.5))[0] @ pose[:3, :3]
+    after[:3, 3] += step[3:6]
+    return View(moved, after)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from legato.geometry.transforms import rotation_from_vector, transform
+from legato.vision.overlay import NotThere
 from legato.vision.picture import Grey
-from legato.vision.refine import NotThere, Refined, noise_of, polish_mark, refine_mark
+from legato.vision.refine import Refined, noise_of, polish_mark, refine_mark
 from legato.vision.view import View
 
 
