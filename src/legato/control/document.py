@@ -10,7 +10,7 @@ from legato.calibration.problem import GENES
 from legato.control.perceive import Calibration
 from legato.control.settings import CellSettings
 from legato.control.verify import Check, picture_checks
-from legato.geometry.transforms import Array
+from legato.geometry.projection import project
 
 NOT_SEPARABLE = "f, s_x and s_y are not separately observable: only alpha_u and alpha_v are"
 
@@ -22,14 +22,16 @@ def document(
     checks = picture_checks(calibration, settings) if checks is None else list(checks)
     solution, problem = calibration.solution, calibration.problem
     camera = solution.intrinsics
+    marks = {n: calibration.picking.marks[n] for n in _shown(calibration, settings)}
     return {
         "accepted": all(c.ok for c in checks),
         "reasons": [c.text for c in checks if not c.ok],
         "engine": solution.engine,
         "intrinsics": "free" if problem.known is None else "known",
-        "marks": _named(calibration, problem.pixels),
+        "marks": {n: [m.u, m.v] for n, m in marks.items()},
         "missing": dict(calibration.picking.missing),
-        "residuals": _named(calibration, solution.residuals),
+        "left_out": list(calibration.left_out),
+        "residuals": _residuals(calibration, settings),
         "rms_px": solution.rms_px,
         "camera_from_object": solution.camera_from_object.tolist(),
         "world_from_object": calibration.world_from_object.tolist(),
@@ -51,7 +53,7 @@ def document(
         "agreement": solution.agreement,
         "held_out": [asdict(h) for h in calibration.held_out],
         "suspects": list(calibration.suspects.names),
-        "warnings": [*calibration.degeneracy.warnings, NOT_SEPARABLE],
+        "warnings": _warnings(calibration),
         "trace": {"best": list(solution.trace.best), "mean": list(solution.trace.mean)},
         "generations": solution.generations,
         "stopped_by": solution.stopped_by,
@@ -66,9 +68,28 @@ def document(
     }
 
 
-def _named(calibration: Calibration, values: Array) -> dict[str, list[float]]:
-    pairs = zip(calibration.problem.names, values, strict=True)
-    return {name: [float(v) for v in value] for name, value in pairs}
+def _shown(calibration: Calibration, settings: CellSettings) -> list[str]:
+    """Return the marks used and those left out, in the leg's order."""
+    used = {*calibration.problem.names, *calibration.left_out}
+    return [n for n in settings.leg.names() if n in used]
+
+
+def _residuals(calibration: Calibration, settings: CellSettings) -> dict[str, list[float]]:
+    """Return predicted minus seen in px, for the marks left out too."""
+    names = _shown(calibration, settings)
+    solution, marks = calibration.solution, calibration.picking.marks
+    points = settings.leg.points(tuple(names))
+    predicted = project(solution.intrinsics, solution.camera_from_object, points)
+    return {
+        n: [float(p[0] - marks[n].u), float(p[1] - marks[n].v)]
+        for n, p in zip(names, predicted, strict=True)
+    }
+
+
+def _warnings(calibration: Calibration) -> list[str]:
+    out = calibration.left_out
+    said = [f"left out, since the others contradict: {', '.join(out)}"] if out else []
+    return [*said, *calibration.degeneracy.warnings, NOT_SEPARABLE]
 
 
 def _parameters(calibration: Calibration) -> list[dict[str, Any]]:

@@ -7,17 +7,30 @@ from collections.abc import Generator
 from typing import Any
 
 from legato.control.document import document
-from legato.control.effects import Effect, Enter, Find, Grab, Refused, Save, Solve, StopRequested
+from legato.control.effects import (
+    CellFault,
+    Effect,
+    Enter,
+    Find,
+    Grab,
+    Refused,
+    Save,
+    Solve,
+    StopRequested,
+    Why,
+)
 from legato.control.massage import in_state, passes
 from legato.control.memory import Memory
 from legato.control.motion import Procedure, Track
 from legato.control.perceive import Calibration
+from legato.control.plan import transit
+from legato.control.rehearsal import Way, problem
 from legato.control.settings import CellSettings
 from legato.control.states import CALIBRATE, CAPTURE, MOVE_HOME, STOPPING, VERIFY
 from legato.control.strokes import Job
 from legato.control.table import PRECONDITION, Refusal
 from legato.control.verify import Check, cell_checks, picture_checks, second_picture_check
-from legato.hal.faults import Cause
+from legato.hal.faults import Cause, DeviceError
 
 CALIBRATION_FILE = "calibration.json"
 
@@ -63,6 +76,12 @@ def _stoppable(track: Track, work: Procedure) -> Generator[Effect, Any, str]:
         yield Enter(STOPPING)
         yield from track.retreat()
         return "stopped"
+    except (CellFault, DeviceError, Refused):
+        raise
+    except Exception:
+        # Trouble that is not the arm's, such as a full disk: come off the leg first.
+        yield from track.retreat()
+        raise
     return "done"
 
 
@@ -78,7 +97,7 @@ def _work(job: str, settings: CellSettings, memory: Memory, track: Track, now: f
         case "verify":
             return _verify(settings, memory, now)
         case "home":
-            return _home(settings, track)
+            return _home(settings, memory, track)
         case "massage":
             return _massage(settings, memory, track)
     raise ValueError(f"there is no job {job}")
@@ -88,9 +107,9 @@ def _run(settings: CellSettings, memory: Memory, track: Track, now: float) -> Pr
     yield from _capture(memory)
     yield from _calibrate(settings, memory)
     yield from _verify(settings, memory, now)
-    yield from _home(settings, track)
+    yield from _home(settings, memory, track)
     yield from _massage(settings, memory, track)
-    yield from _home(settings, track)
+    yield from _home(settings, memory, track)
 
 
 def _capture(memory: Memory) -> Procedure:
@@ -127,14 +146,29 @@ def _verify(settings: CellSettings, memory: Memory, now: float) -> Procedure:
     memory.verified_at = now
 
 
-def _home(settings: CellSettings, track: Track) -> Procedure:
+def _home(settings: CellSettings, memory: Memory, track: Track) -> Procedure:
     def work() -> Procedure:
         yield from track.read()
+        _see_the_way(settings, memory, track)
         yield from track.travel(settings.home)
 
     yield from in_state(track, MOVE_HOME, work)
 
 
+def _see_the_way(settings: CellSettings, memory: Memory, track: Track) -> None:
+    """Raise Refused, before the first motion, where the way home is not clear."""
+    leg = memory.calibration.world_from_object if memory.calibration is not None else None
+    way = Way((track.pose, *transit(settings, track.pose, settings.home)), Why.TRANSIT)
+    found = problem(settings, leg, way)
+    if found:
+        raise Refused(Cause.LIMIT, (f"the way home is not clear: {found}",))
+
+
 def _massage(settings: CellSettings, memory: Memory, track: Track) -> Procedure:
     assert memory.calibration is not None, "precondition of massage"
-    yield from passes(Job(settings, memory.calibration, track))
+    try:
+        yield from passes(Job(settings, memory.calibration, track))
+    except CellFault:
+        # Contact where none was predicted, or none where it was: the calibration no longer holds.
+        memory.verified_at = None
+        raise

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from legato.calibration.degeneracy import Degeneracy, inspect
-from legato.calibration.heldout import HeldOut, Suspects, held_out, suspects
+from legato.calibration.heldout import HeldOut, Suspects, held_out
 from legato.calibration.problem import GENES, CalibrationError, Problem, Solution
-from legato.calibration.solve import solve
+from legato.calibration.robust import Robust, solve_robust
 from legato.control.effects import CellFault, Refused
 from legato.control.settings import CellSettings
-from legato.geometry.projection import project
+from legato.geometry.projection import pinhole_pixels
 from legato.geometry.transforms import Array
 from legato.hal.camera import Image
 from legato.hal.faults import Cause
@@ -22,13 +22,17 @@ from legato.vision.marks import MarksNotFound, Picking
 
 Picks = Mapping[str, tuple[float, float]]
 
+LENS_ROUNDS = 5
+LENS_CLOSE = 1e-3  # px
+
 
 @dataclass(frozen=True)
 class Calibration:
     """One picture's answer: what was seen, what was solved, and what speaks for and against it.
 
-    `stations` (S, 3) and `normals` (S, 3) are the stations on the leg's top line and the surface
-    normals there, in the robot base frame.
+    `problem` is what was solved: without the marks `left_out`, and with free intrinsics in pixels
+    freed of the lens's known distortion. `stations` (S, 3) and `normals` (S, 3) are the stations on
+    the leg's top line and the surface normals there, in the robot base frame.
     """
 
     picking: Picking
@@ -37,6 +41,7 @@ class Calibration:
     degeneracy: Degeneracy
     held_out: tuple[HeldOut, ...]
     suspects: Suspects
+    left_out: tuple[str, ...]
     world_from_object: Array
     stations: Array
     normals: Array
@@ -72,11 +77,13 @@ def find_leg(
 
 
 def solve_marks(picking: Picking, settings: CellSettings, *, seed: int) -> Calibration:
-    """Solve for camera and pose from marks; raises CalibrationError."""
-    problem = _problem(picking, settings)
+    """Solve for camera and pose from marks; raises CalibrationError.
+
+    One or two marks that beyond doubt are wrong are left out.
+    """
     rng = np.random.default_rng(seed)
-    solution = solve(problem, settings.calibration.engine, settings.engine, rng, settings.leg.marks)
-    left_out = held_out(problem, solution)
+    found = _solved(_problem(picking, settings), settings, rng)
+    problem, solution = found.problem, found.solution
     world_from_object = settings.world_from_camera @ solution.camera_from_object
     places = np.array(settings.stations)
     rotation, origin = world_from_object[:3, :3], world_from_object[:3, 3]
@@ -86,12 +93,33 @@ def solve_marks(picking: Picking, settings: CellSettings, *, seed: int) -> Calib
         problem=problem,
         solution=solution,
         degeneracy=inspect(problem, settings.leg.marks),
-        held_out=left_out,
-        suspects=suspects(problem, solution, settings.engine, rng),
+        held_out=held_out(problem, solution),
+        suspects=found.suspects,
+        left_out=found.left_out,
         world_from_object=world_from_object,
         stations=settings.leg.surface_point(places) @ rotation.T + origin,
         normals=np.tile(normal, (len(places), 1)),
     )
+
+
+def _solved(problem: Problem, settings: CellSettings, rng: np.random.Generator) -> Robust:
+    """Return the solution; free intrinsics keep the nominal camera's distortion."""
+    table, marks, camera = settings.calibration, settings.leg.marks, settings.nominal
+    if problem.known is not None or not (camera.k1 or camera.k2):
+        return solve_robust(problem, table.engine, settings.engine, rng, marks)
+    seen = problem.pixels
+    for _ in range(LENS_ROUNDS):
+        # The distortion depends on the camera that is sought: begin with the nominal one.
+        straight = pinhole_pixels(camera, seen)
+        found = solve_robust(
+            replace(problem, pixels=straight), table.engine, settings.engine, rng, marks
+        )
+        found_camera = replace(found.solution.intrinsics, k1=camera.k1, k2=camera.k2)
+        moved = np.abs(pinhole_pixels(found_camera, seen) - straight).max(initial=0.0)
+        camera = found_camera
+        if moved < LENS_CLOSE:
+            break
+    return replace(found, solution=replace(found.solution, intrinsics=camera))
 
 
 def perceive(image: Image, settings: CellSettings, *, seed: int) -> Calibration:
@@ -100,18 +128,6 @@ def perceive(image: Image, settings: CellSettings, *, seed: int) -> Calibration:
         return solve_marks(find_marks_in(image, settings, seed=seed), settings, seed=seed)
     except CalibrationError as error:
         raise Refused(Cause.CALIBRATION_REJECTED, (str(error),)) from error
-
-
-def disagreement(calibration: Calibration, second: Picking) -> tuple[float, int]:
-    """Return how far (rms px) a second picture's marks lie from the prediction, and how many."""
-    names = tuple(n for n in calibration.problem.names if n in second.marks)
-    if not names:
-        return float("inf"), 0
-    points = calibration.problem.points[[calibration.problem.names.index(n) for n in names]]
-    solution = calibration.solution
-    seen = np.array([(second.marks[n].u, second.marks[n].v) for n in names])
-    apart = project(solution.intrinsics, solution.camera_from_object, points) - seen
-    return float(np.sqrt(np.mean(np.sum(apart**2, axis=-1)))), len(names)
 
 
 def _problem(picking: Picking, settings: CellSettings) -> Problem:

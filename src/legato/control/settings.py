@@ -16,10 +16,10 @@ from legato.geometry.projection import Intrinsics
 from legato.geometry.shapes import Shapes
 from legato.geometry.transforms import Array
 
-Positive = Annotated[float, Meta(gt=0)]
-NotNegative = Annotated[float, Meta(ge=0)]
-Count = Annotated[int, Meta(ge=1)]
-Range = tuple[float, float]
+Positive = Annotated[float, Meta(gt=0, le=1_000_000)]
+Seconds = Annotated[float, Meta(ge=0, le=60)]
+Bound = Annotated[float, Meta(ge=-1_000_000, le=1_000_000)]
+Range = tuple[Bound, Bound]
 
 EngineName = Literal["hybrid", "paper", "separable"]
 
@@ -49,11 +49,11 @@ class CalibrationSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_on
     marks: tuple[str, ...] = ()
     """Marks to use; all that are found where empty."""
     bounds: BoundsSettings = BoundsSettings()
-    population: Annotated[int, Meta(ge=10)] = 200
-    generations: Count = 2000
+    population: Annotated[int, Meta(ge=10, le=10_000)] = 200
+    generations: Annotated[int, Meta(ge=1, le=100_000)] = 2000
     crossover_rate: Annotated[float, Meta(gt=0, le=1)] = 0.8
     mutation_rate: Annotated[float, Meta(ge=0, le=1)] = 0.1
-    seed: Annotated[int, Meta(ge=0)] = 1
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 1
     pixel_sigma: Positive = 0.03
     """No mark's coordinates are trusted to better than this, in px: it stands for what picking
     cannot know, such as marks pasted by hand (0.2 mm at 160 mm is about 1 px)."""
@@ -63,27 +63,36 @@ class CalibrationSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """A mark left out may be off by so many of its own predicted standard deviations."""
     max_second_picture_px: Positive = 0.5
     """How far marks of the second picture may lie, rms, from where the first predicts them."""
+    max_second_picture_mm: Positive = 0.4
+    """How far the second picture's own pose may put a station from where the first puts it."""
+    min_agreement: Annotated[float, Meta(ge=0, le=1)] = 0.1
+    """Share of the searches that must end in the pose that is taken."""
+    max_mark_size_percent: Positive | None = 0.3
+    """How far the marks' mean size may be off: 0.4 % stands for 1 mm at the farthest station. A leg
+    of another size with marks of the right one is told by this alone."""
+    leg_rests_mm: Range | None = (-4.0, 30.0)
+    """How high over the table the leg's lowest point may lie; none does not ask."""
     allow_on_bound: bool = False
-    fresh_s: Positive = 3600.0
+    fresh_s: Annotated[float, Meta(gt=0, le=604_800)] = 3600.0
     """A verified calibration older than this is not used for a massage."""
 
 
 class DrawSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Strokes that press at one station and draw along the leg to the next."""
 
-    count: Annotated[int, Meta(ge=0)] = 0
+    count: Annotated[int, Meta(ge=0, le=100)] = 0
     """From each station but the last; none is the paper's massage."""
     depth_mm: Annotated[float, Meta(ge=0, le=5)] = 1.0
     speed_mm_s: Annotated[float, Meta(gt=0, le=100)] = 20.0
-    dwell_s: NotNegative = 0.5
+    dwell_s: Seconds = 0.5
 
 
 class MassageSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One pass: strokes at one station."""
 
-    strokes: Count = 3
+    strokes: Annotated[int, Meta(ge=1, le=100)] = 3
     press_mm: Annotated[float, Meta(ge=0, le=5)] = 1.5
-    dwell_s: NotNegative = 1.0
+    dwell_s: Seconds = 1.0
     contact_window_mm: Annotated[float, Meta(gt=0, le=8)] = 2.0
     """How far above or below the predicted surface the switch may close."""
     descent_mm: Annotated[float, Meta(gt=0, le=0.5)] = 0.5

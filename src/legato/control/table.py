@@ -8,14 +8,26 @@ from legato.control.states import FAULT, IDLE, MOVE_HOME, PAUSED, STOPPING, stat
 
 JOBS: Final = ("run", "capture", "calibrate", "verify", "home", "massage")
 READERS: Final = ("ping", "status", "describe", "wait", "sessions", "session", "events_since")
-ALWAYS: Final = (*READERS, "estop", "shutdown")
+ALWAYS: Final = (*READERS, "estop", "shutdown", "lease")
 METHODS: Final = (*ALWAYS, *JOBS, "pause", "resume", "stop", "reset", "reference")
+STOPS: Final = ("stop", "estop")
+ACTING: Final = (*JOBS, "pause", "resume", "reset", "reference", "shutdown")
+"""What a lease keeps for its holder; nobody ever needs one to stop."""
+
+OPERATOR: Final = "operator"
+ROLES: Final = {
+    "observer": READERS,
+    "stopper": (*READERS, *STOPS),
+    OPERATOR: METHODS,
+}
+"""What each role of a client's key may ask for."""
 
 REFUSED_IN_STATE: Final = "refused_in_state"
 BUSY: Final = "busy"
 IN_FAULT: Final = "in_fault"
 PRECONDITION: Final = "precondition"
 UNAVAILABLE: Final = "unavailable"
+NOT_AUTHORISED: Final = "not_authorised"
 
 
 @dataclass(frozen=True)
@@ -41,10 +53,19 @@ def admit(method: str, state: str) -> Refusal | None:
     if method in (*JOBS, "reference"):
         return None if state == IDLE else _busy(method, state)
     if method == "pause":
-        return None if _pausable(state) else _unfit(method, state, "only motion can be paused")
+        return None if pausable(state) else _unfit(method, state, "only motion can be paused")
     if method == "resume":
         return None if state == PAUSED else _unfit(method, state, "nothing is paused")
     return _unfit(method, state, "nothing is running") if state == IDLE else None
+
+
+def authorise(method: str, role: str) -> Refusal | None:
+    """Return None where a client of this role may ask for `method` at all, else the refusal."""
+    if method in ROLES.get(role, ()):
+        return None
+    able = ", ".join(name for name, methods in ROLES.items() if method in methods)
+    hint = f"ask with a key of role {able}"
+    return Refusal(NOT_AUTHORISED, f"{method} is not for role {role}", hint)
 
 
 def describe_table(stations: Iterable[float]) -> list[dict[str, str]]:
@@ -58,7 +79,8 @@ def describe_table(stations: Iterable[float]) -> list[dict[str, str]]:
     return table
 
 
-def _pausable(state: str) -> bool:
+def pausable(state: str) -> bool:
+    """Say whether a job in this state can be told to hold."""
     return state == MOVE_HOME or state.startswith("massage_")
 
 

@@ -61,7 +61,7 @@ def picking_of(settings: CellSettings, world_from_object: Array) -> Picking:
     camera_from_object = invert(settings.world_from_camera) @ world_from_object
     pixels = project(settings.nominal, camera_from_object, settings.leg.points())
     pairs = zip(settings.leg.names(), pixels, strict=True)
-    return Picking({n: FoundMark(float(u), float(v), 0.05) for n, (u, v) in pairs})
+    return Picking({n: FoundMark(float(u), float(v), 0.05, 1.0, 0.002) for n, (u, v) in pairs})
 
 
 def calibration_of(settings: CellSettings, world_from_object: Array) -> Calibration:

@@ -98,6 +98,8 @@ def test_a_leg_that_sank_is_a_late_contact_and_the_arm_is_up(bench: Maker) -> No
         cell.run("massage")
     assert cell.moves()[-1].why is do.Why.RETRACT
     assert cell.touches() == []
+    again = precondition("massage", cell.settings, cell.memory, 0.0)
+    assert again is not None, "a calibration that led to a fault counts as verified"
 
 
 def test_a_leg_that_rose_is_an_early_contact_and_the_arm_is_up(bench: Maker) -> None:
@@ -108,6 +110,22 @@ def test_a_leg_that_rose_is_an_early_contact_and_the_arm_is_up(bench: Maker) -> 
     cell.world.place_leg(higher)
     with pytest.raises(do.CellFault, match="contact_early"):
         cell.run("massage")
+    assert not cell.world.switch_closed
+
+
+def test_trouble_that_is_not_the_arms_lets_it_come_off_the_leg(bench: Maker) -> None:
+    """Whatever fails beside the arm while the fingertip is down, the retract is made first."""
+    cell = bench()
+    asked = [0]
+
+    def trouble(effect: do.Effect) -> Exception | None:
+        asked[0] += isinstance(effect, do.Dwell)
+        return OSError("no space left") if asked[0] == 1 and isinstance(effect, do.Dwell) else None
+
+    cell.interrupt = trouble
+    with pytest.raises(OSError, match="no space"):
+        cell.run("massage")
+    assert cell.moves()[-1].why is do.Why.RETRACT
     assert not cell.world.switch_closed
 
 

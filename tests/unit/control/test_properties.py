@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from legato.control.verify import dry_run
+from legato.control.rehearsal import dry_run
 from legato.geometry.transforms import rotation_from_vector, transform
 from tests.unit.control.cell import Bench, calibration_of, make_bench
 

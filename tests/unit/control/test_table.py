@@ -3,7 +3,17 @@
 import pytest
 
 from legato.control.states import states
-from legato.control.table import ALWAYS, JOBS, METHODS, admit, describe_table
+from legato.control.table import (
+    ACTING,
+    ALWAYS,
+    JOBS,
+    METHODS,
+    READERS,
+    ROLES,
+    admit,
+    authorise,
+    describe_table,
+)
 
 STATIONS = (7.0, 67.0)
 ALL = states(STATIONS)
@@ -54,3 +64,21 @@ def test_an_unknown_method_is_no_row_of_the_table() -> None:
     """The table answers for its own methods only."""
     with pytest.raises(KeyError):
         admit("self_destruct", "idle")
+
+
+def test_roles_grow_and_observers_only_read() -> None:
+    """Who may stop may also read, who may act may do all; a refusal says whose key can ask."""
+    assert set(ROLES["observer"]) < set(ROLES["stopper"]) < set(ROLES["operator"]) == set(METHODS)
+    assert set(ROLES["stopper"]) - set(ROLES["observer"]) == {"stop", "estop"}
+    assert not set(ROLES["observer"]) & {*ACTING, "lease", "stop", "estop"}
+    for role, methods in ROLES.items():
+        for method in METHODS:
+            no = authorise(method, role)
+            assert (no is None) == (method in methods)
+            assert no is None or (no.code == "not_authorised" and "operator" in no.hint)
+    assert authorise("status", "none") is not None
+
+
+def test_a_lease_never_stands_before_a_stop() -> None:
+    """All that changes the cell is under the lease, but for stopping, and the lease itself."""
+    assert set(METHODS) - set(ACTING) - set(READERS) == {"stop", "estop", "lease"}
