@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -117,6 +118,14 @@ def known_intrinsics(loaded: Loaded) -> KnownIntrinsics | None:
     return loaded.intrinsics.known()
 
 
+def _guess(loaded: Loaded) -> Intrinsics:
+    """Return the nominal camera, with the lens's distortion where a file tells it."""
+    guess = nominal_intrinsics(loaded.config)
+    if loaded.intrinsics is None:
+        return guess
+    return replace(guess, k1=loaded.intrinsics.k1, k2=loaded.intrinsics.k2)
+
+
 def cell_settings(loaded: Loaded) -> CellSettings:
     """Return all that a procedure is told of the cell."""
     config = loaded.config
@@ -133,7 +142,7 @@ def cell_settings(loaded: Loaded) -> CellSettings:
         lead_in=config.robot.lead_in_mm,
         workspace=workspace(config),
         world_from_camera=world_from_camera(config),
-        nominal=known.intrinsics if known is not None else nominal_intrinsics(config),
+        nominal=known.intrinsics if known is not None else _guess(loaded),
         known=known,
         calibration=config.calibration,
         engine=engine_settings(config),

@@ -6,6 +6,7 @@ Types and single ranges are the schema's business; here stand the checks across 
 import re
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from legato.config.build import arm_model, leg
 from legato.config.endpoints import check_endpoint
 from legato.config.errors import ABSENT, ConfigError
 from legato.config.schema import Config, Point, PoseTable, ServerTable
-from legato.control.states import massage_state
+from legato.control.states import MASSAGE_DEADLINE, massage_state
 from legato.geometry.arm import Unreachable, reach
 from legato.geometry.transforms import (
     NotARotation,
@@ -29,11 +30,12 @@ MARK_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,15}")
 FEWEST_MARKS = 7
 FEWEST_USED = 6  # with a known camera; the calibration asks for more where it is free
 SURFACE_MM = 0.5
+STROKE_S = 30.0  # about what a stroke takes beside its dwell
 
 
 def check(config: Config, file: Path) -> None:
     """Raise ConfigError for the first thing that does not fit together in `config`."""
-    check_server(config.server, file)
+    check_server(config.server, file, encrypted=config.server.curve is not None)
     _check_camera_pose(config, file)
     _check_ranges(config, file)
     _check_leg(config, file)
@@ -41,14 +43,21 @@ def check(config: Config, file: Path) -> None:
     _check_calibration(config, file)
     _check_arm(config, file)
     _check_sim(config, file)
+    _check_massage(config, file)
+    _check_records(config, file)
 
 
-def check_server(server: ServerTable, file: Path) -> None:
-    """Raise ConfigError unless every endpoint is on loopback and no two are the same."""
+def check_server(server: ServerTable, file: Path, *, encrypted: bool) -> None:
+    """Raise ConfigError for an endpoint beyond loopback that is not encrypted, or named twice."""
+    for name, other in (("client_secret", "server_public"), ("server_public", "client_secret")):
+        if getattr(server, name) is None and getattr(server, other) is not None:
+            expected = f"a key file, since server.{other} is given"
+            hint = "make keys with `legato keygen`"
+            raise ConfigError(file, f"server.{name}", ABSENT, expected, hint)
     endpoints = {"requests": server.requests, "events": server.events, "stop": server.stop}
     seen: dict[str, str] = {}
     for name, endpoint in endpoints.items():
-        check_endpoint(file, f"server.{name}", endpoint)
+        check_endpoint(file, f"server.{name}", endpoint, encrypted=encrypted)
         if endpoint in seen and not endpoint.endswith(":*"):
             expected = f"another endpoint than server.{seen[endpoint]}'s"
             raise ConfigError(file, f"server.{name}", endpoint, expected)
@@ -211,6 +220,32 @@ def _check_sim(config: Config, file: Path) -> None:
         _check_reach(config, "sim.arm_at_mm", truth, file)
     if config.camera.driver == "sim":
         _check_aim("sim.camera_looks_at_mm", sim.camera_at_mm, sim.camera_looks_at_mm, file)
+
+
+def _check_massage(config: Config, file: Path) -> None:
+    """Raise ConfigError where a station's strokes cannot end before its state's deadline."""
+    massage, draws = config.massage, config.massage.draw
+    each = massage.dwell_s + STROKE_S
+    whole = massage.strokes * each + draws.count * (draws.dwell_s + STROKE_S)
+    if whole < MASSAGE_DEADLINE:
+        return
+    most = f"under the {MASSAGE_DEADLINE:g} s that a station may take, not {whole:g} s"
+    about = f"with about {STROKE_S:g} s a stroke beside its dwell"
+    if massage.strokes * each < MASSAGE_DEADLINE:
+        expected = f"draws with massage.draw.dwell_s = {draws.dwell_s:g} and massage.strokes {most}"
+        raise ConfigError(file, "massage.draw.count", draws.count, expected, about)
+    expected = f"strokes with massage.dwell_s = {massage.dwell_s:g} {most}"
+    raise ConfigError(file, "massage.strokes", massage.strokes, expected, about)
+
+
+def _check_records(config: Config, file: Path) -> None:
+    """Raise ConfigError where a file stands at the place of the records' folder."""
+    place = Path(config.records.state_dir)
+    taken = False
+    with suppress(OSError):  # who may not look is told when the records are opened
+        taken = place.exists() and not place.is_dir()
+    if taken:
+        raise ConfigError(file, "records.state_dir", str(place), "a folder, or a place for one")
 
 
 def _check_aim(key: str, eye: Point, target: Point, file: Path) -> None:

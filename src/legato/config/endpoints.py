@@ -1,4 +1,4 @@
-"""Where the daemon may listen: loopback only, until encryption with listed keys is there."""
+"""Where the daemon may listen: beyond loopback only where the line is encrypted."""
 
 import re
 from ipaddress import IPv4Address, IPv6Address, ip_address
@@ -8,11 +8,15 @@ from legato.config.errors import ConfigError
 
 TCP = re.compile(r"tcp://(?P<host>\[[^\]]*\]|[^:\[\]]*):(?P<port>\d{1,5}|\*)")
 LONGEST_PATH = 100  # a Unix socket's address has room for 107 bytes, some for its neighbours
+EVERYWHERE = {"*": "127.0.0.1", "0.0.0.0": "127.0.0.1", "[::]": "[::1]"}  # and its loopback
 EXPECTED = "tcp://127.0.0.1:PORT (PORT 1 to 65535, or * for a free one), or ipc://PATH"
 
 
-def check_endpoint(file: Path, key: str, endpoint: str) -> None:
-    """Raise ConfigError unless `endpoint` is a loopback TCP address or a Unix socket's path."""
+def check_endpoint(file: Path, key: str, endpoint: str, *, encrypted: bool) -> None:
+    """Raise ConfigError unless `endpoint` is a TCP address or a Unix socket's path.
+
+    Beyond loopback the line must be `encrypted`.
+    """
     if endpoint.startswith("ipc://"):
         path = endpoint.removeprefix("ipc://")
         if not 0 < len(path.encode()) <= LONGEST_PATH or path.startswith(("*", "@")):
@@ -25,8 +29,13 @@ def check_endpoint(file: Path, key: str, endpoint: str) -> None:
     if match["port"] != "*" and not 0 < int(match["port"]) < 65536:
         raise ConfigError(file, key, endpoint, EXPECTED)
     address = _address(match["host"])
+    if encrypted and match["host"]:
+        return
     if match["host"] != "localhost" and (address is None or not address.is_loopback):
-        hint = "beyond loopback the daemon needs encryption with a list of allowed client keys"
+        hint = (
+            "beyond loopback the line needs encryption: server.curve at the daemon, "
+            "server.client_secret and server.server_public at a client"
+        )
         raise ConfigError(file, key, endpoint, f"an address on loopback: {EXPECTED}", hint)
 
 
@@ -36,6 +45,14 @@ def resolved(endpoint: str, folder: Path) -> str:
     if path == endpoint or not path:
         return endpoint
     return f"ipc://{folder / Path(path).expanduser()}"
+
+
+def reachable(endpoint: str) -> str:
+    """Return where a client on this machine finds a daemon that listens at `endpoint`."""
+    match = TCP.fullmatch(endpoint)
+    if match is None or match["host"] not in EVERYWHERE:
+        return endpoint
+    return f"tcp://{EVERYWHERE[match['host']]}:{match['port']}"
 
 
 def has_fixed_port(endpoint: str) -> bool:

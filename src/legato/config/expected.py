@@ -124,13 +124,17 @@ def describe(wanted: inspect.Type) -> str:
         case inspect.FloatType():
             return "a number" + _range(wanted)
         case inspect.StrType():
-            return "a text in quotes"
+            return "a text in quotes" + (", not an empty one" if wanted.pattern else "")
         case inspect.TupleType():
             return f"a list of {len(wanted.item_types)}, each {describe(wanted.item_types[0])}"
         case inspect.VarTupleType() | inspect.ListType():
             least = f"at least {wanted.min_length}, " if wanted.min_length else ""
-            return f"a list of {least}each {describe(wanted.item_type)}"
-        case inspect.StructType() | inspect.DictType():
+            most = f"at most {wanted.max_length}, " if wanted.max_length else ""
+            return f"a list of {least}{most}each {describe(wanted.item_type)}"
+        case inspect.DictType():
+            most = f" of at most {wanted.max_length} keys" if wanted.max_length else ""
+            return f"a table{most}"
+        case inspect.StructType():
             return "a table"
         case inspect.UnionType():
             parts = [t for t in wanted.types if not isinstance(t, inspect.NoneType)]
@@ -147,5 +151,5 @@ def _range(wanted: inspect.IntType | inspect.FloatType) -> str:
         (wanted.lt, "below"),
         (wanted.le, "at most"),
     ]
-    parts = [f"{word} {limit:g}" for limit, word in limits if limit is not None]
+    parts = [f"{word} {limit:.12g}" for limit, word in limits if limit is not None]
     return f" {' and '.join(parts)}" if parts else ""

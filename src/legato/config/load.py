@@ -65,7 +65,7 @@ def load_server(path: Path | None = None) -> ServerTable:
     tables = read_toml(file, "a configuration file")
     data = {"server": tables["server"]} if "server" in tables else {}
     server = _absolute(decode(data, Config, file), file).server
-    check_server(server, file)
+    check_server(server, file, encrypted=server.curve is not None or server.is_client)
     return server
 
 
@@ -104,9 +104,18 @@ def _absolute(config: Config, file: Path) -> Config:
         requests=resolved(server.requests, folder),
         events=resolved(server.events, folder),
         stop=resolved(server.stop, folder),
+        client_secret=_optional(server.client_secret, folder),
+        server_public=_optional(server.server_public, folder),
     )
+    if server.curve is not None:
+        secret, clients = _path(server.curve.secret, folder), _path(server.curve.clients, folder)
+        server = replace(server, curve=replace(server.curve, secret=secret, clients=clients))
     records = replace(config.records, state_dir=_path(config.records.state_dir, folder))
     return replace(config, server=server, camera=camera, records=records)
+
+
+def _optional(name: str | None, folder: Path) -> str | None:
+    return None if name is None else _path(name, folder)
 
 
 def _path(name: str, folder: Path) -> str:

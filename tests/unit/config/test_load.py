@@ -57,6 +57,46 @@ BAD: list[tuple[str, str, str, str]] = [
     (SIM + "[sim]\nu0 = inf\n", "sim.u0", "inf", "finite"),
     (SIM + "[leg]\nstations_mm = []\n", "leg.stations_mm", "[]", "at least 1"),
     (SIM + "[massage]\ndescent_mm = 0.6\n", "massage.descent_mm", "0.6", "at most 0.5"),
+    # Numbers that no cell has, each at its table's end.
+    (SIM + "[records]\nkeep_days = 36501\n", "records.keep_days", "36501", "at most 36500"),
+    (SIM + "[records]\nmin_free_mb = 10000001\n", "records.min_free_mb", "1", "most 10000000"),
+    (SIM + "[massage]\nstrokes = 101\n", "massage.strokes", "101", "at most 100"),
+    (SIM + "[massage]\ndwell_s = 60.1\n", "massage.dwell_s", "60.1", "at most 60"),
+    (SIM + "[massage.draw]\ndwell_s = 61\n", "massage.draw.dwell_s", "61", "at most 60"),
+    (SIM + "[massage.draw]\ncount = 101\n", "massage.draw.count", "101", "at most 100"),
+    (SIM + "[calibration]\npopulation = 10001\n", "calibration.population", "1", "most 10000"),
+    (SIM + "[calibration]\ngenerations = 100001\n", "calibration.generations", "1", "100000"),
+    (SIM + "[calibration]\nfresh_s = 604801\n", "calibration.fresh_s", "604801", "at most 604800"),
+    (
+        SIM + "[calibration.bounds]\nf = [1, 1e9]\n",
+        "calibration.bounds.f[1]",
+        "1000000000",
+        "most 1000000",
+    ),
+    (SIM + "[robot]\nreply_margin_s = 1e9\n", "robot.reply_margin_s", "1000000000", "at most 60"),
+    (SIM + "[robot]\nhand_mm = 1e300\n", "robot.hand_mm", "1e+300", "at most 10000"),
+    (PLACE + CAMERA + "timeout_s = 61\n", "camera.timeout_s", "61", "at most 60"),
+    (PLACE + CAMERA + "max_age_s = 61\n", "camera.max_age_s", "61", "at most 60"),
+    (SIM + "[sim]\npicture_s = 61\n", "sim.picture_s", "61", "at most 60"),
+    (SIM + "[sim]\ntime_scale = 1e5\n", "sim.time_scale", "100000", "at most 10000"),
+    (SIM + "[sim]\nleg_at_mm = [0, 1e300, 0]\n", "sim.leg_at_mm[1]", "1e+300", "at most 100000"),
+    # What cannot end in time.
+    (
+        SIM + "[massage]\nstrokes = 25\ndwell_s = 6\n",
+        "massage.strokes",
+        "25",
+        "massage.dwell_s = 6 under the 900 s that a station may take, not 900 s",
+    ),
+    (
+        SIM + "[massage]\nstrokes = 20\n[massage.draw]\ncount = 20\n",
+        "massage.draw.count",
+        "20",
+        "massage.draw.dwell_s = 0.5 and massage.strokes under the 900 s",
+    ),
+    # Where the records are.
+    (SIM + "[records]\nstate_dir = ''\n", "records.state_dir", "''", "not an empty one"),
+    (SIM + "[records]\nstate_dir = ' '\n", "records.state_dir", "' '", "not an empty one"),
+    (SIM + "[records]\nstate_dir = 'cell.toml'\n", "records.state_dir", "cell.toml", "a folder"),
     # The camera's place.
     (CAMERA, "cell.camera_at_mm", "nothing", "world_from_camera"),
     (
