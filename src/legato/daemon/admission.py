@@ -6,6 +6,7 @@ Each check raises the Failure that the client is told.
 from legato.control.settings import CellSettings
 from legato.control.states import CALIBRATE, CAPTURE, MOVE_HOME, VERIFY, massage_state
 from legato.daemon.messages import View
+from legato.daemon.standing import Setting
 from legato.records.errors import RecordError
 from legato.records.store import Store
 from legato.wire.jsonrpc import Failure
@@ -24,6 +25,29 @@ def first_state(job: str, stations: tuple[float, ...]) -> str:
         "home": MOVE_HOME,
         "massage": massage_state(stations[0]),
     }[job]
+
+
+def need_worker(job: str, busy: str | None, *, ending: bool) -> None:
+    """Raise Failure where the daemon is ending, or the worker busy with something."""
+    if ending:
+        raise Failure("unavailable", "the daemon is shutting down", "start it again")
+    if busy is not None:
+        reason = f"{job} must wait: the cell is busy with {busy}"
+        raise Failure("busy", reason, "it ends by itself soon")
+
+
+def need_free_worker(busy: str | None) -> None:
+    """Raise Failure where the worker of a job that was dropped has not let go of it."""
+    if busy is not None:
+        hint = "a device is slow to answer; try again in some seconds"
+        raise Failure("unavailable", f"the worker has not let go of {busy} yet", hint)
+
+
+def need_all(job: str, view: View, setting: Setting, store: Store) -> None:
+    """Raise Failure where a job lacks devices, knowledge or room for its record."""
+    need_devices(job, view)
+    need_knowledge(job, view, setting.settings, setting.clock())
+    need_room(store, setting.min_free_mb)
 
 
 def need_devices(job: str, view: View) -> None:

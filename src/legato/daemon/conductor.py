@@ -7,15 +7,20 @@ state has a deadline, and after an estop the worker sends nothing more.
 from collections.abc import Mapping
 from typing import Any
 
-from legato.control.states import (
-    FAULT,
-    IDLE,
-    STOPPING,
-    NotAllowed,
+from legato.control.states import FAULT, IDLE, PAUSED, STOPPING, NotAllowed, moves
+from legato.control.table import pausable
+from legato.daemon import reports
+from legato.daemon.admission import (
+    first_state,
+    need_all,
+    need_devices,
+    need_free_worker,
+    need_worker,
 )
-from legato.daemon.admission import first_state, need_devices, need_knowledge, need_room
+from legato.daemon.closing import LET_GO_S, Closing
 from legato.daemon.journal import Journal
-from legato.daemon.log import Log
+from legato.daemon.lease import Leases
+from legato.daemon.log import Log, note
 from legato.daemon.messages import (
     DevicesKnown,
     FaultReport,
@@ -28,19 +33,16 @@ from legato.daemon.messages import (
     TaskEnded,
     WorkerGone,
 )
-from legato.daemon.orders import DoJob, DoReference, DoReset, Orders, Quit
+from legato.daemon.orders import DoJob, Orders
 from legato.daemon.sessions import Session
 from legato.daemon.standing import Setting, Standing
+from legato.daemon.tasks import Tasks
 from legato.daemon.waiters import DEVICES, What
 from legato.geometry.motion import ToolPose
 from legato.hal.faults import Cause
 from legato.records.errors import RecordError
 from legato.records.store import Store
 from legato.wire.jsonrpc import Failure
-
-HEARTBEAT_S = 1.0
-LET_GO_S = 5.0  # how long a dropped job's worker may hold back the session's outcome
-CLOSE_S = 20.0  # how long a running job may take to retract at the end of the daemon
 
 
 class Conductor:
@@ -56,6 +58,8 @@ class Conductor:
         log: Log,
     ) -> None:
         self.standing = standing
+        self.leases = Leases(log)
+        self.tasks = Tasks(orders)
         self.settled: list[tuple[What, Mapping[str, Any] | Failure]] = []
         self.devices_known = False
         self.finished = False
@@ -65,13 +69,12 @@ class Conductor:
         self._orders = orders
         self._store = store
         self._log = log
-        self._beat_at = standing.now
+        self.gate = orders.gate
+        self._pause_for: tuple[str, str | None] = ("pause", None)
         self._busy: str | None = None
-        self._token = 0
-        self._resetting: int | None = None
         self._versions: Mapping[str, str] = {}
-        self._closing_at: float | None = None
-        self._quit_at: float | None = None
+        self._closing: Closing | None = None
+        self._fault_to_come: FaultReport | None = None
 
     @property
     def state(self) -> str:
@@ -80,85 +83,75 @@ class Conductor:
 
     # What requests ask for; each may raise Failure. The total table has been asked before.
 
-    def start(self, job: str, key: str | None) -> Session:
-        """Begin a job's session and hand it to the worker."""
-        self._need_worker(job)
-        view, settings = self.standing.view, self._setting.settings
-        need_devices(job, view)
-        need_knowledge(job, view, settings, self._setting.clock())
-        need_room(self._store, self._setting.min_free_mb)
-        first = first_state(job, settings.stations)
+    def start(self, job: str, key: str | None, *, by: str, since: int) -> Session:
+        """Begin a job's session and hand it to the worker.
+
+        A stop after the gate's first `since` came after this request was sent.
+        """
+        need_worker(job, self._busy, ending=self._closing is not None)
+        if self.gate.stopped_since(since):
+            hint = "send it again if it is still wanted"
+            raise Failure("expired", f"a stop came while {job} waited its turn", hint)
+        need_all(job, self.standing.view, self._setting, self._store)
+        first = first_state(job, self._setting.settings.stations)
         try:
-            session = self.standing.begin(job, key, self._versions, first)
+            session = self.standing.begin(job, key, by, self._versions, first)
         except RecordError as error:
             raise Failure("precondition", error.text, error.hint) from error
         assert session.writer is not None
         self._busy = job
-        self._orders.give(DoJob(session.id, job, session.writer))
+        self._orders.give(DoJob(session.id, job, session.writer), since)
         self._see_disk()
         return session
 
-    def stop(self) -> None:
+    def stop(self, by: str | None = None) -> None:
         """Let the running job retract and end."""
         if self.state != STOPPING:
             self._orders.stop()
-            self.standing.enter(STOPPING, "stop")
+            self.standing.enter(STOPPING, "stop", by)
             self._see_disk()
 
-    def pause(self) -> None:
-        """Let the running job retract and hold at its next safe point."""
+    def pause(self, by: str | None = None, cause: str = "pause") -> None:
+        """Let the running job retract and hold."""
+        self._pause_for = cause, by
         self._orders.pause()
 
     def resume(self) -> None:
         """Let the held job go on."""
         self._orders.resume()
 
-    def estop(self) -> None:
+    def estop(self, by: str | None = None) -> None:
         """Let no further motion command go out, in any state."""
         self._orders.drop()
-        if self._resetting is not None:
+        broken_off = self.tasks.break_off()
+        if broken_off is not None:
             no = Failure("in_fault", "an emergency stop came in between", "send reset again")
-            self.settled.append((("task", self._resetting), no))
-            self._resetting = None
-        hint = "see that all is well, then send reset"
-        self._fail(FaultReport(Cause.ESTOP, "an emergency stop was asked for", hint))
+            self.settled.append((("task", broken_off), no))
+        self._fail(reports.estop(by), by)
 
     def reset(self) -> int:
         """Ask the worker whether arm and camera answer; return the task's number."""
-        if self._busy is not None:
-            hint = "a device is slow to answer; try again in some seconds"
-            raise Failure("unavailable", f"the worker has not let go of {self._busy} yet", hint)
+        need_free_worker(self._busy)
         self._busy = "reset"
-        self._token += 1
-        self._resetting = self._token
-        self._orders.give(DoReset(self._token))
-        return self._token
+        return self.tasks.reset()
 
     def reference(self, pose: ToolPose) -> int:
         """Let the worker take the arm to stand at a pose; return the task's number."""
-        self._need_worker("reference")
+        need_worker("reference", self._busy, ending=self._closing is not None)
         need_devices("reference", self.standing.view)
         self._busy = "reference"
-        self._token += 1
-        self._orders.give(DoReference(self._token, pose))
-        return self._token
+        return self.tasks.reference(pose)
 
-    def give_up(self, token: int) -> None:
-        """Forget a task that nobody waits for any more: its late success changes no state."""
-        if token == self._resetting:
-            self._resetting = None
-
-    def shutdown(self) -> None:
+    def shutdown(self, by: str | None = None) -> None:
         """Begin to end: a running job retracts first."""
-        if self._closing_at is None:
-            self._closing_at = self.standing.now
+        if self._closing is None:
+            self._closing = Closing(self._orders, self.standing.now)
             if self.standing.sessions.current is not None and self.state != FAULT:
-                self.stop()
-
-    # What the worker says, and time.
+                self.stop(by)
 
     def receive(self, message: Message) -> None:
-        """Take in one message of the worker."""
+        """Take in one message of another thread."""
+        self._see_gate()
         standing = self.standing
         match message:
             case DevicesKnown(view, versions):
@@ -182,52 +175,68 @@ class Conductor:
                 self._task_ended(message)
             case WorkerGone(text):
                 self._worker_gone(text)
+            case _:
+                note(self._log, message)
         self._see_disk()
 
     def tick(self, now: float) -> None:
         """Let time pass: deadlines, heartbeat, the end."""
         standing = self.standing
         standing.now = now
+        self._see_gate()
+        self._see_lease(now)
         if now > standing.due:
-            text = f"{standing.state} has not ended within {standing.in_state_s:.0f} s"
-            hint = "see the evidence for what it was doing; look at arm and camera, then reset"
-            self._fail(FaultReport(Cause.DEADLINE, text, hint))
+            self._fail_after_retreat(reports.deadline(standing.state, standing.in_state_s))
         stuck = standing.sessions.current is not None and standing.in_state_s > LET_GO_S
         if standing.state == FAULT and stuck:
             self._settle_session(standing.end_in_fault())
-        if now >= self._beat_at:
-            self._beat_at = max(self._beat_at + HEARTBEAT_S, now)
-            standing.sessions.seal()
-            beat = {"state": standing.state, "uptime_s": standing.uptime_s}
-            self._journal.publish("heartbeat", beat)
-        if self._closing_at is not None:
-            self._close(now, self._closing_at)
+        standing.beat()
+        if self._closing is not None:
+            self._close(self._closing, now)
 
     def next_due(self) -> float:
         """Return when `tick` is due next."""
-        return min(self._beat_at, self.standing.due)
+        return min(self.standing.beat_at, self.standing.due, self.leases.next_due())
 
-    # What follows from it.
+    def _see_gate(self) -> None:
+        """Follow what the stop line has asked for; the worker heeds it without waiting for this."""
+        for asked in self.gate.news():
+            if asked.estop:
+                self.estop(asked.by)
+            elif self.standing.running:
+                self.stop(asked.by)
+
+    def _see_lease(self, now: float) -> None:
+        """Pause where the operator who asked for a deadman has not renewed the lease."""
+        running, can = self.standing.running, pausable(self.state)
+        unmanned = self.leases.unmanned(now, running=running, pausable=can)
+        if unmanned is not None:
+            self.pause(unmanned, "lease_lost")
 
     def _granted(self, state: str) -> bool:
         """Enter a state for a procedure; false where it may not, since a stop came first."""
+        cause, by = self._pause_for if state == PAUSED else (self._busy or "", None)
         try:
-            self.standing.enter(state, self._busy or "")
+            self.standing.enter(state, "stop" if state == STOPPING else cause, by)
         except NotAllowed as error:
             self._log.info("not_entered", reason=str(error))
             return False
+        self._see_lease(self.standing.now)
         return True
 
     def _job_ended(self, end: JobEnded) -> None:
         standing = self.standing
         self._busy, standing.view = None, end.view
         if standing.is_current(end.session):
-            if end.fault is not None:
-                self._fail(end.fault)
+            fault = self._fault_to_come or end.fault
+            if fault is not None:
+                self._fail(fault)
             if standing.state == FAULT:
                 self._settle_session(standing.end_in_fault())
             else:
                 outcome = end.outcome or "interrupted"
+                if standing.state == STOPPING and outcome == "done":
+                    outcome = "stopped"  # asked for while the last effect was under way
                 standing.enter(IDLE, outcome)
                 self._settle_session(standing.end(outcome, end.reason, end.cause))
         standing.keep()
@@ -236,10 +245,8 @@ class Conductor:
         standing = self.standing
         self._busy, standing.view = None, end.view
         failure = Failure("unavailable", *end.problem) if end.problem is not None else None
-        if end.token == self._resetting:
-            self._resetting = None
-            if failure is None:
-                standing.clear()
+        if self.tasks.ended(end.token, well=failure is None):
+            standing.clear()
         standing.keep()
         result = {"state": standing.state, "arm": dict(standing.view.arm)}
         self.settled.append((("task", end.token), failure or result))
@@ -248,18 +255,29 @@ class Conductor:
         if text is not None:
             self._log.error("worker_gone", traceback=text)
             self.exit_code = 1
-            hint = "report it with the daemon's log"
-            evidence = {"traceback": text}
-            self._fail(FaultReport(Cause.INTERNAL, "the worker has ended", hint, evidence))
+            self._fail(reports.worker_gone(text))
         if self.standing.sessions.current is not None:
             self._settle_session(self.standing.end_in_fault())
         self.standing.keep()
         self.finished = True
 
-    def _fail(self, report: FaultReport) -> None:
+    def _fail_after_retreat(self, report: FaultReport) -> None:
+        """Latch a fault that is not the arm's own once the job has come off the leg.
+
+        The retreat is a stop like any other, with that state's deadline.
+        """
+        if not moves(self.state) or self.state == STOPPING:
+            self._fail(self._fault_to_come or report)
+            return
+        self._fault_to_come = report
+        self._orders.stop()
+        self.standing.enter(STOPPING, str(report.cause))
+
+    def _fail(self, report: FaultReport, by: str | None = None) -> None:
         """Latch a fault; nothing more goes to the arm."""
+        self._fault_to_come = None
         self._orders.drop()
-        self.standing.fail(report)
+        self.standing.fail(report, by)
 
     def _settle_session(self, session: str) -> None:
         self.settled.append((("session", session), {}))
@@ -267,27 +285,15 @@ class Conductor:
     def _see_disk(self) -> None:
         """Go to fault where the disk did not take a record."""
         error = self._journal.take_error()
-        if error is not None:
-            self._fail(FaultReport(Cause.DISK, error.text, error.hint))
+        if error is not None and self._fault_to_come is None:
+            self._fail_after_retreat(reports.disk(error))
             self._journal.take_error()
 
-    def _close(self, now: float, since: float) -> None:
+    def _close(self, closing: Closing, now: float) -> None:
         """Go on ending: wait for the job, then for the worker, neither for ever."""
-        if self.standing.sessions.current is not None:
-            if now - since < CLOSE_S:
-                return
-            self._orders.drop()
+        running = self.standing.sessions.current is not None
+        if closing.gives_up(now, running=running):
             reason = "the daemon was told to end"
             self._settle_session(self.standing.end("interrupted", reason, Cause.INTERRUPTED))
-        if self._quit_at is None:
-            self._quit_at = now
-            self._orders.give(Quit())
-        elif now - self._quit_at > LET_GO_S:
-            self.finished = True
-
-    def _need_worker(self, job: str) -> None:
-        if self._closing_at is not None:
-            raise Failure("unavailable", "the daemon is shutting down", "start it again")
-        if self._busy is not None:
-            hint = "it ends by itself soon"
-            raise Failure("busy", f"{job} must wait: the cell is busy with {self._busy}", hint)
+            running = False
+        self.finished = self.finished or closing.over(now, running=running)

@@ -9,21 +9,24 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, assert_never
 
 from legato.control.settings import CellSettings
-from legato.control.table import JOBS, admit
+from legato.control.table import JOBS, METHODS, READERS, admit, authorise
 from legato.daemon.conductor import Conductor
 from legato.daemon.events import Events
 from legato.daemon.log import Log
 from legato.daemon.sessions import Session as KnownSession
 from legato.daemon.status import describe
-from legato.daemon.waiters import DEVICES, Waiter, Waiters, What
+from legato.daemon.waiters import DEVICES, Ask, Waiter, Waiters, What
+from legato.daemon.who import LOCAL, Who
 from legato.geometry.arm import Unreachable, reach
 from legato.geometry.motion import ToolPose
-from legato.wire.jsonrpc import Call, Failure, Malformed, answer, decode_params, receive, refuse
+from legato.wire.jsonrpc import Failure, Malformed, answer, decode_params, receive, refuse
 from legato.wire.requests import (
+    Acting,
     Describe,
     Estop,
     EventsSince,
     Job,
+    Lease,
     Pause,
     Ping,
     Reference,
@@ -38,7 +41,10 @@ from legato.wire.requests import (
     Wait,
 )
 
-TASK_S = 20.0  # how long reset and reference may take, and how long a job waits for the devices
+TASK_S = 20.0  # how long reset and reference may take
+# How long a job waits for devices that are being opened: less than any client waits, so that no
+# job begins that somebody was told had failed.
+JOB_WAIT_S = 3.0
 NEED_DEVICES = (*JOBS, "reference", "reset")
 
 Result = Mapping[str, Any]
@@ -46,10 +52,19 @@ Send = Callable[[list[bytes]], None]
 
 
 class Desk:
-    """Answers requests through `send`, in frames; the loop's thread alone uses it."""
+    """Answers requests through `send`, in frames; the loop's thread alone uses it.
+
+    `stops` tells the stop line's latencies, for status.
+    """
 
     def __init__(
-        self, conductor: Conductor, events: Events, settings: CellSettings, send: Send, log: Log
+        self,
+        conductor: Conductor,
+        events: Events,
+        settings: CellSettings,
+        send: Send,
+        log: Log,
+        stops: Callable[[], Result | None] = lambda: None,
     ) -> None:
         self.junk = 0
         self._conductor = conductor
@@ -57,10 +72,16 @@ class Desk:
         self._settings = settings
         self._send = send
         self._log = log
+        self._stops = stops
         self._waiters = Waiters()
 
-    def receive(self, frames: Sequence[bytes], now: float) -> None:
-        """Take in one message; whatever it is, nothing is raised."""
+    def receive(
+        self, frames: Sequence[bytes], now: float, who: Who = LOCAL, since: int | None = None
+    ) -> None:
+        """Take in one message; whatever it is, nothing is raised.
+
+        It came after the gate's first `since` stops, by default after all.
+        """
         message = receive(frames)
         if isinstance(message, Malformed):
             self.junk += 1
@@ -68,19 +89,20 @@ class Desk:
             frames = refuse(message.route, message.id, message.failure, self._conductor.state)
             self._send(frames)
         else:
-            self._answer(message, now)
+            stops = self._conductor.gate.number if since is None else since
+            self._answer(Ask(message, who, stops), now)
 
     def settle(self, now: float) -> None:
         """Answer those whose wait has ended or whose time is up."""
         settled, self._conductor.settled = self._conductor.settled, []
         for what, result in settled:
-            for call in self._waiters.take(what):
+            for ask in self._waiters.take(what):
                 if what == DEVICES:
-                    self._answer(call, now)
+                    self._answer(ask, now)
                 elif isinstance(result, Failure):
-                    self._refuse(call, result)
+                    self._refuse(ask, result)
                 else:
-                    self._reply(call, result or self._wait_told(str(what[1])))
+                    self._reply(ask, result or self._wait_told(str(what[1])))
         for waiter in self._waiters.take_due(now):
             self._out_of_time(waiter)
 
@@ -92,53 +114,69 @@ class Desk:
         """Answer all that still wait: the daemon ends."""
         for waiter in self._waiters.take_all():
             if _is_session(waiter.what):
-                self._reply(waiter.call, self._wait_told(str(waiter.what[1])))
+                self._reply(waiter.ask, self._wait_told(str(waiter.what[1])))
             else:
-                self._refuse(waiter.call, Failure("unavailable", "the daemon is shutting down"))
+                self._refuse(waiter.ask, Failure("unavailable", "the daemon is shutting down"))
 
-    def _answer(self, call: Call, now: float) -> None:
+    def _answer(self, ask: Ask, now: float) -> None:
         """Carry out one request and answer it, now or later."""
         try:
-            result = self._carried_out(call, now)
+            result = self._carried_out(ask, now)
         except Failure as failure:
-            self._refuse(call, failure)
+            self._refuse(ask, failure)
         except Exception as error:  # noqa: BLE001  # a bug in one request must not reach the next
-            self._log.error("bug", method=call.method, traceback=traceback.format_exc())
+            self._log.error("bug", method=ask.call.method, traceback=traceback.format_exc())
             hint = "report it with the daemon's log"
-            self._refuse(call, Failure("internal_error", f"{type(error).__name__}: {error}", hint))
+            self._refuse(ask, Failure("internal_error", f"{type(error).__name__}: {error}", hint))
         else:
             if result is not None:
-                self._reply(call, result)
+                self._reply(ask, result)
 
-    def _carried_out(self, call: Call, now: float) -> Result | None:
+    def _carried_out(self, ask: Ask, now: float) -> Result | None:
         """Return the result of a request, None where it is answered later; raises Failure."""
+        call = ask.call
+        if call.method in METHODS:
+            no = authorise(call.method, ask.who.role)
+            if no is not None:
+                raise Failure(no.code, no.reason, no.hint)
         request = decode_params(call)
         if isinstance(request, Job) and request.key is not None:
             known = self._conductor.standing.sessions.with_key(request.key)
             if known is not None:
                 return self._repeated(call.method, known)
+        if isinstance(request, Acting):
+            self._in_time(request, now)
+            self._conductor.leases.check(request.lease, ask.who, now)
         if call.method in NEED_DEVICES and not self._conductor.devices_known:
-            return self._later(call, DEVICES, now + TASK_S)
+            patience = JOB_WAIT_S if call.method in JOBS else TASK_S
+            return self._later(ask, DEVICES, now + patience)
         no = admit(call.method, self._conductor.state)
         if no is not None:
             raise Failure(no.code, no.reason, no.hint)
-        return self._done(call, request, now)
+        return self._done(ask, request, now)
 
-    def _done(self, call: Call, request: Request, now: float) -> Result | None:
+    def _in_time(self, request: Acting, now: float) -> None:
+        """Raise Failure where a request has come too late to be what its sender wants."""
+        if request.expires_at is not None and now > request.expires_at:
+            late = now - request.expires_at
+            raise Failure("expired", f"it came {late:.3f} s after its expires_at", "ask again")
+
+    def _done(self, ask: Ask, request: Request, now: float) -> Result | None:
         """Carry out an admitted request."""
-        conductor = self._conductor
+        conductor, by = self._conductor, ask.who.name
         match request:
             case Ping():
-                return {"boot": self._events.boot, "state": conductor.state}
+                return {"boot": self._events.boot, "state": conductor.state, "now": now}
             case Status():
-                return conductor.standing.status()
+                lease = conductor.leases.told(now)
+                return conductor.standing.status() | {"lease": lease, "stop": self._stops()}
             case Describe():
                 return describe(self._settings.stations)
             case Wait(session=session, timeout_s=timeout):
                 told = self._wait_told(session)
                 if told["outcome"] is not None or timeout == 0:
                     return told
-                return self._later(call, ("session", session), now + timeout)
+                return self._later(ask, ("session", session), now + timeout)
             case Sessions(limit=limit):
                 return {"sessions": conductor.standing.sessions.latest(limit)}
             case Session(session=session):
@@ -146,45 +184,47 @@ class Desk:
             case EventsSince(boot=boot, seq=seq, limit=limit):
                 return self._events.since(boot, seq, limit)
             case Job(key=key):
-                started = conductor.start(call.method, key)
+                started = conductor.start(ask.call.method, key, by=by, since=ask.since)
                 return {"session": started.id, "state": conductor.state}
             case Pause():
-                conductor.pause()
+                conductor.pause(by)
             case Resume():
                 conductor.resume()
             case Stop():
-                conductor.stop()
+                conductor.stop(by)
             case Estop():
-                conductor.estop()
+                conductor.estop(by)
             case Reset():
-                return self._later(call, ("task", conductor.reset()), now + TASK_S)
+                return self._later(ask, ("task", conductor.reset()), now + TASK_S)
             case Reference():
                 token = conductor.reference(self._pose(request))
-                return self._later(call, ("task", token), now + TASK_S)
+                return self._later(ask, ("task", token), now + TASK_S)
+            case Lease():
+                return conductor.leases.ask(request, ask.who, now)
             case Shutdown():
-                conductor.shutdown()
+                conductor.shutdown(by)
             case _:
                 assert_never(request)
         current = conductor.standing.sessions.current
         return {"session": current.id if current else None, "state": conductor.state}
 
-    def _later(self, call: Call, what: What, due: float) -> Result | None:
+    def _later(self, ask: Ask, what: What, due: float) -> Result | None:
         """Let a request wait."""
         if self._waiters.full:
             raise Failure("unavailable", "too many requests wait", "ask again later")
-        self._waiters.add(call, what, due)
+        self._waiters.add(ask, what, due)
         return None
 
     def _out_of_time(self, waiter: Waiter) -> None:
         """Answer a request whose time is up."""
         what = waiter.what
         if _is_session(what):
-            self._reply(waiter.call, self._wait_told(str(what[1])))
+            self._reply(waiter.ask, self._wait_told(str(what[1])))
             return
         if what != DEVICES:
-            self._conductor.give_up(int(what[1]))
+            self._conductor.tasks.give_up(int(what[1]))
         hint = "see status; try again when the devices answer"
-        self._refuse(waiter.call, Failure("unavailable", "the devices are slow to answer", hint))
+        self._refuse(waiter.ask, Failure("unavailable", "the devices are slow to answer", hint))
 
     def _repeated(self, method: str, known: KnownSession) -> Result:
         """Answer a job that was asked for before: nothing starts."""
@@ -221,17 +261,18 @@ class Desk:
             raise Failure("invalid_params", f"the arm cannot stand there: {error}", hint) from error
         return ToolPose(x, y, z, pitch, roll, start.grip)
 
-    def _reply(self, call: Call, result: Result) -> None:
-        told = self._log.info if call.method in NEED_DEVICES else self._log.debug
-        told("request", method=call.method, ok=True, state=self._conductor.state)
+    def _reply(self, ask: Ask, result: Result) -> None:
+        call, by = ask.call, ask.who.name
+        told = self._log.debug if call.method in READERS else self._log.info
+        told("request", method=call.method, ok=True, by=by, state=self._conductor.state)
         if not call.notification:
             self._send(answer(call.route, call.id, result))
 
-    def _refuse(self, call: Call, failure: Failure) -> None:
-        state = self._conductor.state
+    def _refuse(self, ask: Ask, failure: Failure) -> None:
+        call, state = ask.call, self._conductor.state
         self._log.info(
             "request", method=call.method[:64], ok=False, error=failure.name,
-            reason=failure.reason, state=state,
+            reason=failure.reason, by=ask.who.name, state=state,
         )  # fmt: skip
         if not call.notification:
             self._send(refuse(call.route, call.id, failure, state))

@@ -81,7 +81,7 @@ class Devices:
         try:
             reading = self.cell.arm.step(move)
         except BaseException as error:
-            if getattr(self.cell.arm, "position_in_doubt", True):
+            if self.cell.arm.position_in_doubt:
                 self.memory.reference = None
             if isinstance(error, DeviceError) and error.cause in GONE:
                 self._arm_connected = False

@@ -15,7 +15,7 @@ from legato.records.store import Store
 
 
 class Journal:
-    """Record, events and state.json together; `clock` is the cell's, in s."""
+    """Record, events and state.json together; `clock` is the cell's s, `arm` names a real arm."""
 
     def __init__(
         self,
@@ -25,6 +25,7 @@ class Journal:
         clock: Callable[[], float],
         log: Log,
         last: tuple[Any, Any] = (None, None),
+        arm: str | None = None,
     ) -> None:
         self._sessions = sessions
         self._events = events
@@ -32,6 +33,7 @@ class Journal:
         self._clock = clock
         self._log = log
         self._last = last
+        self._arm = arm
         self._error: RecordError | None = None
 
     def tell(self, topic: str, data: Mapping[str, Any], *, durable: bool = False) -> None:
@@ -53,11 +55,16 @@ class Journal:
         return error
 
     def keep(self, fault: Mapping[str, Any] | None, view: View) -> None:
-        """Keep what the next start must know: fault, reference and registers."""
+        """Keep what the next start must know: fault, reference and registers, and of which arm."""
         if view.memory is not None:
             self._last = view.memory.reference, view.memory.registers
         reference, registers = self._last
-        state = {"boot": self._events.boot, "fault": fault}
+        state = {
+            "boot": self._events.boot,
+            "fault": fault,
+            "arm": self._arm,
+            "simulated": self._arm is None,
+        }
         try:
             self._store.save_state(state | {"reference": reference, "registers": registers})
         except RecordError as error:

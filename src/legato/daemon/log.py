@@ -4,9 +4,10 @@ Everything goes to stderr. Work that changes something is told at info, plain lo
 """
 
 import sys
+from functools import cached_property
 from typing import Any, Protocol, TextIO
 
-import structlog
+from legato.daemon.messages import Message, StopAnswered, StopLineBug, TurnedAway
 
 
 class Log(Protocol):
@@ -27,18 +28,55 @@ class Log(Protocol):
 
 def make_log(stream: TextIO | None = None, level: str = "info") -> Log:
     """Return a logger that writes to `stream` (stderr); other loggers stay as they are."""
-    out = stream if stream is not None else sys.stderr
-    shared: list[Any] = [
-        structlog.processors.add_log_level,
-        structlog.processors.TimeStamper(fmt="iso", utc=True),
-    ]
-    if out.isatty():
-        shared.append(structlog.dev.ConsoleRenderer())
-    else:
-        shared.append(structlog.processors.JSONRenderer())
-    log: Log = structlog.wrap_logger(
-        structlog.PrintLogger(out),
-        processors=shared,
-        wrapper_class=structlog.make_filtering_bound_logger(level),
-    )
-    return log
+    return _Late(stream if stream is not None else sys.stderr, level)
+
+
+class _Late:
+    """Loads structlog for its first line: it takes as long as all else that the daemon needs."""
+
+    def __init__(self, out: TextIO, level: str) -> None:
+        self._out = out
+        self._level = level
+
+    @cached_property
+    def _log(self) -> Log:
+        import structlog
+
+        shared: list[Any] = [
+            structlog.processors.add_log_level,
+            structlog.processors.TimeStamper(fmt="iso", utc=True),
+        ]
+        if self._out.isatty():
+            shared.append(structlog.dev.ConsoleRenderer())
+        else:
+            shared.append(structlog.processors.JSONRenderer())
+        log: Log = structlog.wrap_logger(
+            structlog.PrintLogger(self._out),
+            processors=shared,
+            wrapper_class=structlog.make_filtering_bound_logger(self._level),
+        )
+        return log
+
+    def debug(self, event: str, **fields: Any) -> None:
+        if self._level == "debug":
+            self._log.debug(event, **fields)
+
+    def info(self, event: str, **fields: Any) -> None:
+        self._log.info(event, **fields)
+
+    def warning(self, event: str, **fields: Any) -> None:
+        self._log.warning(event, **fields)
+
+    def error(self, event: str, **fields: Any) -> None:
+        self._log.error(event, **fields)
+
+
+def note(log: Log, message: Message) -> None:
+    """Log what stop line and doorman have to tell; of others' messages nothing."""
+    match message:
+        case StopAnswered(told):
+            log.info("stop_line", **told)
+        case StopLineBug(text):
+            log.error("bug", traceback=text)
+        case TurnedAway(address, why):
+            log.warning("turned_away", address=address, why=why)

@@ -1,4 +1,4 @@
-"""What the worker tells the loop. Plain data; events in the past tense."""
+"""What worker, stop line and doorman tell the loop. Plain data; events in the past tense."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -113,4 +113,29 @@ class WorkerGone:
     text: str | None = None
 
 
-Message = DevicesKnown | Looked | StateWanted | Happened | Moved | JobEnded | TaskEnded | WorkerGone
+@dataclass(frozen=True)
+class StopAnswered:
+    """The stop line has answered a stop: its times, for the log."""
+
+    told: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class StopLineBug:
+    """The stop line has met an error of its own and goes on."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class TurnedAway:
+    """Someone was refused at the door: from where, and why."""
+
+    address: str
+    why: str
+
+
+Message = (
+    DevicesKnown | Looked | StateWanted | Happened | Moved | JobEnded | TaskEnded | WorkerGone
+    | StopAnswered | StopLineBug | TurnedAway
+)  # fmt: skip

@@ -7,7 +7,7 @@ fault: a person must look before anything moves.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from legato.daemon.log import Log
 from legato.geometry.motion import Steps
@@ -15,31 +15,55 @@ from legato.hal.faults import Cause
 from legato.records.errors import RecordError
 from legato.records.store import Store, Summary
 
+if TYPE_CHECKING:
+    from legato.config.schema import RobotTable
+
 
 @dataclass(frozen=True)
 class Past:
-    """The latched fault if any, the sessions, and the last reference and registers."""
+    """The latched fault if any, the sessions, and the arm's last reference and registers."""
 
     fault: Mapping[str, Any] | None
     sessions: Sequence[Summary]
     last: tuple[Steps | None, Steps | None] = (None, None)
+    arm: str | None = None
 
 
-def read_past(store: Store, log: Log, *, simulated: bool) -> Past:
-    """Return what there was, after closing what was left open. Raises RecordError."""
+def arm_name(robot: "RobotTable") -> str | None:
+    """Return what tells this cell's arm from another, None for a simulated one."""
+    return None if robot.driver == "sim" else f"{robot.driver} {robot.port}"
+
+
+def read_past(store: Store, log: Log, *, arm: str | None) -> Past:
+    """Return what there was, after closing what was left open. Raises RecordError.
+
+    `arm` names the real arm of this cell, None where it is simulated: a simulated world begins
+    anew with each process, and nothing of its arm outlives it.
+    """
     state = _state(store, log)
     summaries = store.sessions()
     open_ones = [s for s in summaries if s.outcome is None]
+    fault = _fault(state.get("fault"))
+    if open_ones:
+        fault = _interrupted(open_ones[0])
+        # Before the sessions are closed: else a start that fails later would lose it.
+        store.save_state({**state, "fault": fault})
     for summary in open_ones:
         store.close_interrupted(summary.id)
         log.warning("interrupted", session=summary.id, job=summary.job)
-    fault = _fault(state.get("fault"))
-    if open_ones:
-        summaries = store.sessions()
-        fault = _interrupted(open_ones[0])
-    # A simulated world begins anew with each process: nothing of its arm outlives it.
-    last = (None, None) if simulated else (_steps(state, "reference"), _steps(state, "registers"))
-    return Past(fault, summaries, last)
+    last = _arms_place(state) if arm is not None and arm == state.get("arm") else (None, None)
+    return Past(fault, store.sessions() if open_ones else summaries, last, arm)
+
+
+def _arms_place(state: Mapping[str, Any]) -> tuple[Steps | None, Steps | None]:
+    """Return reference and registers, None where the registers would prove nothing.
+
+    An arm that was switched off and moved by hand wakes up with zeros too.
+    """
+    reference, registers = _steps(state, "reference"), _steps(state, "registers")
+    if registers is None or not any(registers):
+        return None, None
+    return reference, registers
 
 
 def _state(store: Store, log: Log) -> Mapping[str, Any]:

@@ -24,6 +24,7 @@ from legato.control.effects import (
     Record,
     Save,
     Solve,
+    Why,
 )
 from legato.control.jobs import CALIBRATION_FILE
 from legato.control.perceive import Calibration, find_marks_in, perceive
@@ -35,6 +36,7 @@ from legato.geometry.arm import forward, joints_from_steps
 from legato.hal.arm import ArmReading
 from legato.hal.camera import Frame
 from legato.hal.faults import Cause
+from legato.records.errors import RecordError
 from legato.records.session import SessionWriter
 from legato.records.trajectory import trajectory_row
 from legato.vision.marks import Picking
@@ -89,6 +91,7 @@ class Performer:
         self._wall = wall
         self._told_at = -TELEMETRY_S
         self._station: float | None = None
+        self._written = False  # a row of the trajectory
 
     def perform(self, effect: Effect) -> Any:
         """Carry out one effect and return its result."""
@@ -149,10 +152,15 @@ class Performer:
         reference = memory.reference
         leg = memory.calibration.world_from_object if memory.calibration is not None else None
         envelope.check(self._settings, leg, move)
-        self._orders.look()
-        reading = self._devices.step(move.move)
+        with self._orders.motion():
+            reading = self._devices.step(move.move)
         self._station = move.station
-        self._row(reading, move.target, str(move.why), reference)
+        try:
+            self._row(reading, move.target, str(move.why), reference)
+        except RecordError:
+            # The way off the leg is not broken off for a disk that takes no more.
+            if move.why is not Why.RETRACT:
+                raise
         expected = tuple(t - r for t, r in zip(move.target, reference, strict=True))
         if reading.registers != expected:
             self._devices.doubt()
@@ -175,6 +183,10 @@ class Performer:
                 "see who moved the arm, then reset and reference it",
                 {"read": list(reading.registers)},
             )
+        stands = self._devices.memory.steps()
+        if reference is not None and stands is not None and not self._written:
+            # Where the first motion starts from; later ones start where the one before ended.
+            self._row(reading, stands, "", reference)
         return reading
 
     def _dwell(self, seconds: float) -> None:
@@ -210,6 +222,7 @@ class Performer:
             why=why,
         )
         self._writer.trajectory(row)
+        self._written = True
 
     def _tell(self, *, paused: bool = False, why: str | None = None) -> None:
         """Give the loop a look at the arm, but not more often than people can see."""

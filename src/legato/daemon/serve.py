@@ -18,22 +18,27 @@ from legato.config.build import cell_settings
 from legato.daemon.cell import build_cell, build_clock
 from legato.daemon.conductor import Conductor
 from legato.daemon.desk import Desk
+from legato.daemon.doorman import Doorman
 from legato.daemon.events import Events
 from legato.daemon.journal import Journal
+from legato.daemon.keys import read_clients, read_secret
 from legato.daemon.lock import AlreadyRunning, only_instance
 from legato.daemon.log import Log, make_log
-from legato.daemon.loop import Loop, Sockets
+from legato.daemon.loop import Loop
 from legato.daemon.mailbox import Mailbox
 from legato.daemon.orders import Orders
-from legato.daemon.past import Past, read_past
+from legato.daemon.past import Past, arm_name, read_past
 from legato.daemon.sessions import Sessions
+from legato.daemon.sockets import Sockets
 from legato.daemon.standing import Setting, Standing
+from legato.daemon.stopline import StopLine
 from legato.daemon.worker import Worker
 from legato.records.errors import RecordError
 from legato.records.store import Store
 
 if TYPE_CHECKING:
     from legato.config.load import Loaded
+    from legato.config.schema import ServerTable
 
 SWITCH_S = 0.0005  # Python's own thread switch: the loop answers while the worker computes
 JOIN_S = 5.0
@@ -54,8 +59,8 @@ def serve(loaded: "Loaded", log: Log | None = None) -> int:
     except zmq.ZMQError as error:
         server = loaded.config.server
         hint = "see what listens there, or set [server] to other ports"
-        log.error("not_bound", requests=server.requests, events=server.events, text=str(error),
-                  hint=hint)  # fmt: skip
+        log.error("not_bound", requests=server.requests, events=server.events, stop=server.stop,
+                  text=str(error), hint=hint)  # fmt: skip
     except OSError as error:
         log.error("state_dir", text=str(error), hint="make records.state_dir writable")
     return 1
@@ -66,13 +71,22 @@ def _serve(loaded: "Loaded", store: Store, log: Log) -> int:
     config = loaded.config
     settings = cell_settings(loaded)
     boot = secrets.token_hex(8)
-    past = read_past(store, log, simulated=settings.simulated)
-    sockets = Sockets(config.server.requests, config.server.events)
-    mailbox = Mailbox()
+    mailbox, orders = Mailbox(), Orders()
+    doorman = _doorman(config.server, mailbox)
+    past = read_past(store, log, arm=arm_name(config.robot))
+    server = config.server
+    sockets = Sockets(server.requests, server.events, server.stop, doorman)
+    stopline = StopLine(
+        sockets.stop,
+        sockets.receive,
+        orders.gate,
+        (orders.wake, mailbox.ring),
+        boot=boot,
+        state=lambda: conductor.state,
+        post=mailbox.offer,
+    )
     try:
-        log.info("listening", version=__version__, boot=boot, **sockets.endpoints)
         clock = build_clock(loaded)
-        orders = Orders()
         events = Events(boot, clock.monotonic, sockets.publish)
         setting = Setting(
             settings=settings,
@@ -82,7 +96,8 @@ def _serve(loaded: "Loaded", store: Store, log: Log) -> int:
             meta={"config_hash": loaded.hash, "config": loaded.data},
         )
         conductor = _conductor(setting, orders, store, past, events, log)
-        desk = Desk(conductor, events, settings, sockets.send, log)
+        stopline.start()
+        desk = Desk(conductor, events, settings, sockets.send, log, stopline.told)
         keep_days = config.records.keep_days
         worker = Worker(
             lambda: build_cell(loaded, clock),
@@ -93,8 +108,10 @@ def _serve(loaded: "Loaded", store: Store, log: Log) -> int:
             last=past.last,
             tidy=lambda: store.prune(keep_days, datetime.now(UTC)),
         )
-        ready = partial(log.info, "ready", boot=boot, **sockets.endpoints)
-        loop = Loop(sockets, mailbox, conductor, desk, events, ready)
+        ends = sockets.endpoints
+        ready = partial(log.info, "ready", boot=boot, **ends)
+        listening = partial(log.info, "listening", version=__version__, boot=boot, **ends)
+        loop = Loop(sockets, mailbox, conductor, desk, events, ready, listening)
         with _signals(mailbox) as ending:
             worker.start()
             try:
@@ -106,16 +123,30 @@ def _serve(loaded: "Loaded", store: Store, log: Log) -> int:
         log.info("ended", clean=worker.join(JOIN_S))
         return conductor.exit_code
     finally:
+        stopline.end()
         sockets.close()
         mailbox.close()
 
 
+def _doorman(server: "ServerTable", mailbox: Mailbox) -> Doorman | None:
+    """Return who guards the sockets, None where nothing is encrypted. Raises ConfigError."""
+    if server.curve is None:
+        return None
+    keys = read_secret(Path(server.curve.secret), "server.curve.secret")
+    return Doorman(keys, read_clients(Path(server.curve.clients)), mailbox.offer)
+
+
 def _conductor(
-    setting: Setting, orders: Orders, store: Store, past: Past, events: Events, log: Log
+    setting: Setting,
+    orders: Orders,
+    store: Store,
+    past: Past,
+    events: Events,
+    log: Log,
 ) -> Conductor:
     """Return the conductor in idle, or in the fault that the past has left."""
     sessions = Sessions(store, past.sessions)
-    journal = Journal(sessions, events, store, setting.clock, log, past.last)
+    journal = Journal(sessions, events, store, setting.clock, log, past.last, past.arm)
     now = time.monotonic()
     standing = Standing(setting, sessions, journal, log, now=now, fault=past.fault)
     return Conductor(setting, standing, journal, orders, store, log)

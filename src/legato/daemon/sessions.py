@@ -29,6 +29,7 @@ class Session:
     outcome: str | None = None
     reason: str | None = None
     cause: str | None = None
+    by: str | None = None
     progress: Mapping[str, Any] | None = None
     writer: SessionWriter | None = field(default=None, repr=False)
 
@@ -64,7 +65,8 @@ class Sessions:
         started = self.now()
         whole = {"job": job, "params": {}, "key": key, "started": started, **meta}
         writer = self._store.begin(whole)
-        session = Session(writer.id, job, key, started, bool(meta["simulated"]), writer=writer)
+        by, simulated = meta.get("by"), bool(meta["simulated"])
+        session = Session(writer.id, job, key, started, simulated, by=by, writer=writer)
         self._known[session.id] = self.current = session
         while len(self._known) > KEPT:
             del self._known[next(iter(self._known))]

@@ -17,6 +17,8 @@ from legato.daemon.sessions import Session, Sessions
 from legato.daemon.status import status_told
 from legato.hal.faults import Cause
 
+HEARTBEAT_S = 1.0
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -52,6 +54,7 @@ class Standing:
         self._log = log
         self._machine = CellMachine(setting.settings.stations, FAULT if fault else IDLE)
         self._entered_at = now
+        self.beat_at = now
         cause = self.fault["cause"] if self.fault else "start"
         journal.tell("state", {"state": self.state, "previous": None, "cause": cause})
         if self.fault:
@@ -61,6 +64,11 @@ class Standing:
     def state(self) -> str:
         """The machine's state."""
         return self._machine.state
+
+    @property
+    def running(self) -> bool:
+        """Whether a job runs or is held."""
+        return self.sessions.current is not None and self.state != FAULT
 
     @property
     def in_state_s(self) -> float:
@@ -94,26 +102,30 @@ class Standing:
         """Say whether a session is the one that runs."""
         return self.sessions.current is not None and self.sessions.current.id == session
 
-    def enter(self, state: str, cause: str) -> None:
-        """Go to a state, if not there already. Raises NotAllowed."""
+    def enter(self, state: str, cause: str, by: str | None = None) -> None:
+        """Go to a state, if not there already; `by` has asked for it. Raises NotAllowed."""
         previous = self.state
         if not self._machine.enter(state):
             return
         self._entered_at = self.now
-        self._log.info("state", state=state, previous=previous, cause=cause)
         change = {"state": state, "previous": previous, "cause": cause}
+        change |= {"by": by} if by is not None else {}
+        self._log.info("state", **change)
         self._journal.tell("state", change, durable=True)
 
-    def begin(self, job: str, key: str | None, versions: Mapping[str, str], state: str) -> Session:
+    def begin(
+        self, job: str, key: str | None, by: str, versions: Mapping[str, str], state: str
+    ) -> Session:
         """Begin a session in the job's first state. Raises RecordError: then nothing has begun."""
         meta = dict(self._setting.meta) | {
             "boot": self._setting.boot,
+            "by": by,
             "simulated": self._setting.settings.simulated,
             "versions": dict(versions),
         }
         session = self.sessions.begin(job, key, meta)
         self._journal.tell("session", _told(session), durable=True)
-        self.enter(state, job)
+        self.enter(state, job, by)
         return session
 
     def happened(self, kind: str, data: Mapping[str, Any]) -> None:
@@ -122,8 +134,8 @@ class Standing:
             self.sessions.current.progress = data
         self._journal.tell(kind, data)
 
-    def fail(self, report: FaultReport) -> None:
-        """Latch a fault, unless one is latched already."""
+    def fail(self, report: FaultReport, by: str | None = None) -> None:
+        """Latch a fault, unless one is latched already; `by` has asked for it."""
         if self.state == FAULT:
             return
         session = self.sessions.current
@@ -136,7 +148,7 @@ class Standing:
             "session": session.id if session else None,
         }
         self._log.error("fault", **self.fault)
-        self.enter(FAULT, str(report.cause))
+        self.enter(FAULT, str(report.cause), by)
         self._journal.tell("fault", self.fault | {"evidence": evidence}, durable=True)
         self.keep()
 
@@ -152,7 +164,7 @@ class Standing:
         told = _told(current) | {"outcome": outcome, "reason": reason}
         self._journal.tell("session", told, durable=True)
         session = self.sessions.end(outcome, reason, cause)
-        self._log.info("session", **session.told())
+        self._log.info("session", **session.told(), by=session.by)
         return session.id
 
     def end_in_fault(self) -> str:
@@ -169,10 +181,24 @@ class Standing:
             if before.arm[name] and not view.arm[name]:
                 self._log.warning(f"arm_not_{name}")
 
+    def beat(self) -> None:
+        """Publish the heartbeat where it is due; try again what the disk has not taken."""
+        if self.now < self.beat_at:
+            return
+        self.beat_at = max(self.beat_at + HEARTBEAT_S, self.now)
+        self.sessions.seal()
+        self._journal.publish("heartbeat", {"state": self.state, "uptime_s": self.uptime_s})
+
     def keep(self) -> None:
         """Keep on disk what the next start must know."""
         self._journal.keep(self.fault, self.view)
 
 
 def _told(session: Session) -> dict[str, Any]:
-    return {"id": session.id, "job": session.job, "outcome": None, "reason": None}
+    return {
+        "id": session.id,
+        "job": session.job,
+        "by": session.by,
+        "outcome": None,
+        "reason": None,
+    }

@@ -6,12 +6,12 @@ from typing import Any
 from legato import __version__
 from legato.control.settings import CellSettings
 from legato.control.states import deadline, massage_state, states
-from legato.control.table import describe_table
+from legato.control.table import ROLES, describe_table
 from legato.daemon.messages import View
 from legato.daemon.sessions import Session
 from legato.hal.faults import Cause
 from legato.wire.jsonrpc import CODES
-from legato.wire.requests import API, OUTCOMES, TOPICS, describe_methods
+from legato.wire.requests import API, OUTCOMES, STOP_LINE, TOPICS, describe_methods
 
 
 def describe(stations: Iterable[float]) -> dict[str, Any]:
@@ -21,6 +21,7 @@ def describe(stations: Iterable[float]) -> dict[str, Any]:
         "api": API,
         "version": __version__,
         "methods": describe_methods(),
+        "stop_line": describe_methods(STOP_LINE),
         "states": list(states(stations)),
         "deadlines_s": {s: deadline(s) for s in states(stations)},
         "table": describe_table(stations),
@@ -28,6 +29,7 @@ def describe(stations: Iterable[float]) -> dict[str, Any]:
         "outcomes": list(OUTCOMES),
         "errors": CODES,
         "topics": list(TOPICS),
+        "roles": {role: list(methods) for role, methods in ROLES.items()},
     }
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from legato.daemon.who import Who
 from legato.wire.jsonrpc import Call
 
 MOST = 256
@@ -13,10 +14,19 @@ DEVICES: What = ("devices", 0)
 
 
 @dataclass(frozen=True)
+class Ask:
+    """A request with who asks; it came after the gate's first `since` stops."""
+
+    call: Call
+    who: Who
+    since: int
+
+
+@dataclass(frozen=True)
 class Waiter:
     """One request; at `due` (monotonic s) it is answered as it then stands."""
 
-    call: Call
+    ask: Ask
     what: What
     due: float
 
@@ -32,13 +42,13 @@ class Waiters:
         """Whether no more may wait."""
         return len(self._waiting) >= MOST
 
-    def add(self, call: Call, what: What, due: float) -> None:
+    def add(self, ask: Ask, what: What, due: float) -> None:
         """Let a request wait for `what`."""
-        self._waiting.append(Waiter(call, what, due))
+        self._waiting.append(Waiter(ask, what, due))
 
-    def take(self, what: What) -> list[Call]:
+    def take(self, what: What) -> list[Ask]:
         """Return and forget those who wait for `what`."""
-        return [w.call for w in self._taken(lambda w: w.what == what)]
+        return [w.ask for w in self._taken(lambda w: w.what == what)]
 
     def take_due(self, now: float) -> list[Waiter]:
         """Return and forget those whose time is up."""

@@ -4,6 +4,7 @@ Whatever happens in a task, the loop gets one message that ends it. Nothing here
 a job's own effects.
 """
 
+import ctypes
 import platform
 import threading
 import time
@@ -29,6 +30,7 @@ from legato.daemon.messages import (
 from legato.daemon.orders import DoJob, DoReference, DoReset, Dropped, Orders, Quit
 from legato.geometry.arm import Unreachable
 from legato.geometry.motion import Steps
+from legato.hal.arm import Traced
 from legato.hal.faults import Cause, DeviceError
 from legato.records.errors import RecordError
 
@@ -171,16 +173,19 @@ class Worker:
         from legato.daemon.perform import Performer
 
         performer = Performer(devices, self._settings, task.writer, self._orders, self._post)
+        began = devices.cell.clock.monotonic()
         outcome, reason, cause, fault = self._outcome(task, devices, performer)
         try:
             if devices.cell.witness is not None:
-                task.writer.document("truth", devices.cell.witness.testimony())
+                truth = truth_since(devices.cell.witness.testimony(), began)
+                task.writer.document("truth", truth)
         except RecordError as error:
             if outcome not in (None, "fault"):
                 fault = FaultReport(Cause.DISK, error.text, error.hint)
                 outcome, reason, cause = "fault", fault.text, fault.cause
         self._tidy_up()
         self._post(JobEnded(task.session, outcome, reason, cause, fault, devices.view()))
+        _give_back()
 
     def _outcome(
         self, task: DoJob, devices: "Devices", performer: "Performer"
@@ -211,14 +216,36 @@ class Worker:
             text = f"{type(error).__name__}: {error}"
             hint = "report it with the record of this session"
             fault = FaultReport(Cause.INTERNAL, text, hint, {"traceback": told})
+        arm = devices.cell.arm
         evidence = {
             "last_effects": list(performer.last_effects),
-            "last_bytes": list(getattr(devices.cell.arm, "last_bytes", ())),
+            "last_bytes": list(arm.last_bytes) if isinstance(arm, Traced) else [],
             "picture": performer.last_picture,
             **fault.evidence,
         }
         fault = FaultReport(fault.cause, fault.text, fault.hint, evidence)
         return "fault", fault.text, fault.cause, fault
+
+
+def _give_back() -> None:
+    """Give the memory that a job has freed back to the system, where the C library can."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
+
+
+def truth_since(testimony: dict[str, object], began: float) -> dict[str, object]:
+    """Return a testimony with only those touches and breaches that are later than `began`.
+
+    `began` is the cell's clock in s.
+    """
+    times = {"touches": "began_s", "breaches": "t_s"}
+    found = dict(testimony)
+    for name, time_of in times.items():
+        kept = found.get(name)
+        if isinstance(kept, list):
+            found[name] = [entry for entry in kept if entry.get(time_of, began) >= began]
+    return found
 
 
 def _versions() -> dict[str, str]:

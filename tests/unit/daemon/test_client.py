@@ -3,13 +3,18 @@
 import json
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
 import zmq
+from hypothesis import given
+from hypothesis import strategies as st
 
 from legato.daemon.client import Client, DaemonUnavailable, RpcError
+from legato.daemon.sequence import Sequence
 
 Behave = Callable[["zmq.Socket[bytes]", list[bytes], dict[str, Any]], None]
 NOBODY = "tcp://127.0.0.1:9"  # discard: nothing listens there
@@ -116,23 +121,112 @@ def test_a_refusal_is_an_error_with_all_its_data() -> None:
     assert caught.value.data["hint"] == "wait"
 
 
-def test_events_come_without_repeats_and_end_with_the_silence() -> None:
-    """What is sent again for others is left out; a new boot begins anew."""
+def test_a_daemon_that_dies_keeps_no_caller(tmp_path: Path) -> None:
+    """A call that is under way fails as soon as the connection is lost; the next finds another."""
+    endpoint = f"ipc://{tmp_path}/line"
+    context = zmq.Context()
+    router = context.socket(zmq.ROUTER)
+    router.linger = 0
+    router.bind(endpoint)
+    with Client(endpoint, timeout_s=30.0) as client, ThreadPoolExecutor(1) as pool:
+        call = pool.submit(client.call, "status")
+        assert router.poll(5000)
+        router.close()
+        with pytest.raises(DaemonUnavailable, match="gone"):
+            call.result(10.0)
+        again = context.socket(zmq.ROUTER)
+        again.linger = 0
+        again.bind(endpoint)
+        call = pool.submit(client.call, "status")
+        *route, body = again.recv_multipart()
+        say(again, route, json.loads(body)["id"], "alive")
+        assert call.result(10.0) == "alive"
+        again.close()
+    context.term()
+
+
+def test_events_come_once_and_what_was_missed_comes_too(tmp_path: Path) -> None:
+    """The latest of each topic first, then all events in order, gaps filled, over a restart."""
     context = zmq.Context()
     publisher = context.socket(zmq.XPUB)
     publisher.linger = 0
-    port = publisher.bind_to_random_port("tcp://127.0.0.1")
-    with Client(NOBODY, f"tcp://127.0.0.1:{port}") as client:
+    publisher.bind(f"ipc://{tmp_path}/events")
+    kept = {"a": 7}  # the daemon's own numbers, by boot
+
+    def replay(router: "zmq.Socket[bytes]", route: list[bytes], call: dict[str, Any]) -> None:
+        assert call["method"] == "events_since"
+        ((boot, last),) = kept.items()
+        first = call["params"]["seq"] + 1 if call["params"]["boot"] == boot else 1
+        found = [{"boot": boot, "seq": n, "topic": "progress"} for n in range(first, last + 1)]
+        say(router, route, call["id"], {"boot": boot, "seq": last, "events": found[:2]})
+
+    def publish(boot: str, topic: str, seq: int) -> None:
+        event = {"boot": boot, "seq": seq, "topic": topic}
+        publisher.send_multipart([topic.encode(), json.dumps(event).encode()])
+
+    with daemon(replay) as address, Client(address, f"ipc://{tmp_path}/events") as client:
         for _ in range(7):
             assert publisher.recv().startswith(b"\x01")
-        told = [("a", "state", 3), ("a", "contact", 2), ("a", "state", 3), ("a", "state", 4),
-                ("b", "state", 1)]  # fmt: skip
-        for boot, topic, seq in told:
-            event = {"boot": boot, "seq": seq}
-            publisher.send_multipart([topic.encode(), json.dumps(event).encode()])
-        heard = [(e["boot"], topic, e["seq"]) for topic, e in client.events(0.2)]
+        for topic, seq in (("state", 5), ("contact", 3), ("state", 5)):
+            publish("a", topic, seq)
+        heard = list(client.events(0.2))
+        assert [(t, e["seq"]) for t, e in heard] == [("state", 5), ("contact", 3)]
+        kept["a"] = 14
+        for topic, seq in (("state", 8), ("contact", 13), ("progress", 12), ("state", 14)):
+            publish("a", topic, seq)
+        heard = list(client.events(0.2))
+        assert [e["seq"] for _, e in heard] == list(range(8, 15))
+        assert [t for t, e in heard if e["seq"] in (8, 9, 13, 14)] == [
+            "state", "progress", "contact", "state",
+        ]  # fmt: skip
+        kept.clear()
+        kept["b"] = 4
+        publish("b", "heartbeat", 4)
+        heard = list(client.events(0.2))
+        assert [(e["boot"], e["seq"]) for _, e in heard] == [("b", n) for n in range(1, 5)]
+        assert client.lost == 0
     context.destroy(linger=0)
-    assert heard == [told[0], told[1], told[3], told[4]]
+
+
+def test_what_no_replay_has_is_counted_as_lost() -> None:
+    """Where the daemon has forgotten events, or cannot be asked, the client says how many."""
+    answers: list[dict[str, Any] | None] = [
+        {"boot": "a", "seq": 1, "events": []},
+        {"boot": "a", "seq": 9, "events": [{"topic": "state", "seq": n} for n in (6, 7, 8, 9)]},
+        None,
+    ]
+    sequence = Sequence(lambda boot, seq: answers.pop(0))  # noqa: ARG005 # the replay's signature
+    heard = [e["seq"] for n in (1, 9, 12) for _, e in sequence.take("state", event("a", n))]
+    assert heard == [1, 6, 7, 8, 9, 12]
+    assert sequence.lost == 4 + 2
+
+
+@given(data=st.data())
+def test_every_event_once_whatever_is_lost_and_repeated(data: st.DataObject) -> None:
+    """From any part of the events, with repeats, a client that can replay has all of them."""
+    total = data.draw(st.integers(1, 30))
+    arriving = sorted(data.draw(st.sets(st.integers(1, total), min_size=1)))
+    topics = [data.draw(st.sampled_from(["state", "contact"])) for _ in range(total + 1)]
+    limit = data.draw(st.integers(1, 5))
+    now = 0
+
+    def replay(boot: str, seq: int) -> dict[str, Any]:
+        found = [event(boot, n) | {"topic": topics[n]} for n in range(seq + 1, now + 1)]
+        return {"boot": boot, "seq": now, "events": found[:limit]}
+
+    sequence, heard = Sequence(replay), list[int]()
+    sequence.begin("a", 0)
+    for seq in arriving:
+        now = seq
+        for _ in range(data.draw(st.integers(1, 2))):
+            heard += [e["seq"] for _, e in sequence.take(topics[seq], event("a", seq))]
+    assert heard == list(range(1, arriving[-1] + 1))
+    assert sequence.lost == 0
+
+
+def event(boot: str, seq: int) -> dict[str, Any]:
+    """Return an event's head."""
+    return {"boot": boot, "seq": seq}
 
 
 def test_events_need_their_address() -> None:

@@ -172,7 +172,10 @@ def test_an_estop_during_reset_wins(house: House) -> None:
 @pytest.mark.parametrize("state", ["capture", "calibrate", "verify", "move_home", "massage_7",
                                    "stopping"])  # fmt: skip
 def test_every_transient_state_has_a_deadline(house: House, state: str) -> None:
-    """A state that does not end is fault `deadline`; a worker that is stuck keeps no session."""
+    """A state that does not end is fault `deadline`; a worker that is stuck keeps no session.
+
+    Where the arm may be at the leg it is given the time of a stop to come off it first.
+    """
     session = house.begin("run")
     for step in ("calibrate", "verify", "move_home", "massage_7", "stopping"):
         if house.conductor.state == state:
@@ -183,6 +186,11 @@ def test_every_transient_state_has_a_deadline(house: House, state: str) -> None:
     house.pass_time(limit - 0.1)
     assert house.conductor.state == state
     house.pass_time(0.2)
+    if state in ("move_home", "massage_7"):
+        assert house.conductor.state == "stopping"
+        with pytest.raises(StopRequested):
+            house.orders.look()
+        house.pass_time((deadline("stopping") or 0.0) + 0.1)
     assert house.result("status")["fault"]["cause"] == "deadline"
     assert house.result("session", session=session)["outcome"] is None
     house.pass_time(6.0)
@@ -280,18 +288,29 @@ def test_a_record_that_cannot_begin_is_a_refusal(house: House) -> None:
 
 
 def test_a_disk_that_fails_in_a_job_is_a_fault(house: House) -> None:
-    """An event that cannot be recorded stops the arm; the outcome is kept and told."""
+    """An event that cannot be recorded lets the arm come off the leg, then is fault `disk`."""
     session = house.begin("home")
     current = house.sessions.current
     assert current is not None
     assert current.writer is not None
     current.writer.close()
     house.hear(Happened(session, "progress", {"text": "on"}))
+    assert house.conductor.state == "stopping"
+    with pytest.raises(StopRequested):
+        house.orders.look()
+    house.end(session, "stopped")
     assert house.result("status")["fault"]["cause"] == "disk"
     with pytest.raises(Dropped):
         house.orders.look()
-    house.end(session, None)
     assert house.result("session", session=session)["outcome"] == "fault"
+
+
+def test_a_stop_that_came_with_the_last_effect_is_a_stop(house: House) -> None:
+    """A job that was told to stop ends as stopped, though it had nothing left to do."""
+    session = house.begin("home")
+    assert house.result("stop")["state"] == "stopping"
+    house.end(session, "done")
+    assert house.result("session", session=session)["outcome"] == "stopped"
 
 
 def test_progress_and_station_are_in_status(house: House) -> None:
@@ -313,7 +332,7 @@ def test_status_has_the_designs_keys(house: House) -> None:
     status = house.result("status")
     assert list(status) == [
         "api", "version", "boot", "simulated", "state", "session", "station", "progress",
-        "uptime_s", "arm", "camera", "calibration", "fault",
+        "uptime_s", "arm", "camera", "calibration", "fault", "lease", "stop",
     ]  # fmt: skip
     assert list(status["arm"]) == [
         "connected", "referenced", "xyz_mm", "pitch_deg", "roll_deg", "contact",

@@ -9,8 +9,10 @@ from typing import Any
 import pytest
 
 from legato.control.states import FAULT, IDLE, states
-from legato.control.table import METHODS, admit
+from legato.control.table import METHODS, ROLES, admit
+from legato.daemon.gate import Moment
 from legato.daemon.orders import DoReference
+from legato.daemon.who import Who
 from legato.wire.requests import REQUESTS
 from tests.unit.daemon.bench import settings
 from tests.unit.daemon.house import CAMERA_LOST, House
@@ -264,3 +266,30 @@ def test_those_who_wait_are_answered_at_the_end(house: House) -> None:
     answer = house.answer(call)
     assert answer is not None
     assert answer["result"]["outcome"] is None
+
+
+@pytest.mark.parametrize("role", [*ROLES, "none"])
+def test_a_role_may_ask_for_its_methods_and_no_others(house: House, role: str) -> None:
+    """What a role may not ask for is not authorised, in whatever state, and does nothing."""
+    who = Who("somebody", role)
+    for method in METHODS:
+        if method in ROLES.get(role, ()):
+            continue
+        body = json.dumps({"jsonrpc": "2.0", "id": method, "method": method}).encode()
+        house.desk.receive([b"client", body], house.now, who)
+        (_, answer) = house.replies[-1]
+        assert answer["id"] == method
+        assert (answer["error"]["code"], answer["error"]["message"]) == (-32002, "not_authorised")
+    assert house.conductor.state == "idle"
+    assert house.result("sessions")["sessions"] == []
+
+
+def test_a_job_that_a_stop_has_overtaken_does_not_begin(house: House) -> None:
+    """Sent before a stop, handled after it: refused; sent after it, it begins."""
+    gate = house.conductor.gate
+    gate.ask("somebody", Moment(house.now, 0.0), estop=False)
+    body = json.dumps({"jsonrpc": "2.0", "id": "old", "method": "home"}).encode()
+    house.desk.receive([b"client", body], house.now, since=0)
+    (_, answer) = house.replies[-1]
+    assert (answer["id"], answer["error"]["message"]) == ("old", "expired")
+    assert house.result("home")["state"] == "move_home"

@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 import zmq
 
-from legato.daemon.loop import Loop, Sockets
+from legato.daemon.loop import Loop
 from legato.daemon.mailbox import Mailbox
 from legato.daemon.messages import WorkerGone
+from legato.daemon.sockets import Sockets
 from legato.wire.jsonrpc import MAX_BYTES
 from legato.wire.requests import TOPICS
 from tests.unit.daemon.house import House
@@ -24,7 +25,7 @@ class Served:
     """A loop that turns when the test says so, and its clients."""
 
     def __init__(self, folder: Path) -> None:
-        self.sockets = Sockets(ANY, ANY)
+        self.sockets = Sockets(ANY, ANY, ANY)
         self.house = House(
             folder,
             now=time.monotonic(),

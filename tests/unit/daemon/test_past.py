@@ -8,6 +8,8 @@ from legato.daemon.past import read_past
 from legato.records.store import Store
 from tests.unit.daemon.bench import STARTED, Silent
 
+ARM = "teachmover /dev/ttyUSB0"
+
 
 @pytest.fixture
 def store(tmp_path: Path) -> Store:
@@ -17,7 +19,7 @@ def store(tmp_path: Path) -> Store:
 
 def test_nothing_before_is_no_fault(store: Store) -> None:
     """The first start begins in idle, with an arm that must be referenced."""
-    past = read_past(store, Silent(), simulated=False)
+    past = read_past(store, Silent(), arm=ARM)
     assert (past.fault, list(past.sessions), past.last) == (None, [], (None, None))
 
 
@@ -25,7 +27,7 @@ def test_an_open_session_is_interrupted(store: Store) -> None:
     """It gets its outcome, and the daemon its fault."""
     writer = store.begin({"job": "run", "started": STARTED})
     writer.close()
-    past = read_past(store, Silent(), simulated=True)
+    past = read_past(store, Silent(), arm=None)
     assert past.fault is not None
     assert (past.fault["cause"], past.fault["session"]) == ("interrupted", writer.id)
     assert [s.outcome for s in past.sessions] == ["interrupted"]
@@ -36,15 +38,29 @@ def test_a_fault_outlives_its_daemon(store: Store) -> None:
     """Only reset leaves a fault; a restart does not."""
     fault = {"cause": "estop", "text": "t", "hint": "h", "since": "now", "session": None}
     store.save_state({"fault": fault})
-    assert read_past(store, Silent(), simulated=True).fault == fault
+    assert read_past(store, Silent(), arm=None).fault == fault
 
 
-def test_the_arms_place_is_kept_for_a_real_arm_only(store: Store) -> None:
-    """A simulated world begins anew, a real arm still stands where it stood."""
-    store.save_state({"reference": [1, 2, 3, 4, 5, 6], "registers": [0] * 6, "fault": None})
-    real = read_past(store, Silent(), simulated=False)
-    assert real.last == ((1, 2, 3, 4, 5, 6), (0,) * 6)
-    assert read_past(store, Silent(), simulated=True).last == (None, None)
+def test_the_arms_place_is_kept_for_the_same_real_arm_only(store: Store) -> None:
+    """A simulated world begins anew; another arm, or one that woke up with zeros, is no proof."""
+    known = {"reference": [1, 2, 3, 4, 5, 6], "registers": [0, 0, 7, 0, 0, 7], "fault": None}
+    store.save_state(known | {"arm": ARM})
+    assert read_past(store, Silent(), arm=ARM).last == ((1, 2, 3, 4, 5, 6), (0, 0, 7, 0, 0, 7))
+    assert read_past(store, Silent(), arm=None).last == (None, None)
+    assert read_past(store, Silent(), arm="teachmover /dev/ttyUSB1").last == (None, None)
+    store.save_state(known | {"arm": None})
+    assert read_past(store, Silent(), arm=ARM).last == (None, None)
+    store.save_state(known | {"arm": ARM, "registers": [0] * 6})
+    assert read_past(store, Silent(), arm=ARM).last == (None, None)
+
+
+def test_the_interruption_is_kept_before_the_session_is_closed(store: Store) -> None:
+    """A start that fails after this one still finds the fault."""
+    store.begin({"job": "run", "started": STARTED}).close()
+    read_past(store, Silent(), arm=None)
+    again = read_past(store, Silent(), arm=None)
+    assert again.fault is not None
+    assert again.fault["cause"] == "interrupted"
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"fault": 5, "reference": [1], "registers": "x"}',
@@ -53,5 +69,5 @@ def test_a_damaged_state_is_as_good_as_none(store: Store, text: str) -> None:
     """The daemon starts, and the arm must be referenced."""
     store.state_dir.mkdir(exist_ok=True)
     (store.state_dir / "state.json").write_text(text)
-    past = read_past(store, Silent(), simulated=False)
+    past = read_past(store, Silent(), arm=ARM)
     assert (past.fault, past.last) == (None, (None, None))

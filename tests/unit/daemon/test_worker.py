@@ -24,6 +24,7 @@ from legato.control.effects import (
 from legato.control.memory import Memory
 from legato.daemon.messages import Happened, Looked, Moved, StateWanted, TaskEnded, WorkerGone
 from legato.daemon.orders import DoReference, DoReset
+from legato.daemon.worker import truth_since
 from legato.geometry.motion import StepMove, Steps, ToolPose
 from legato.hal.faults import Cause, DeviceError
 from legato.records.errors import RecordError
@@ -406,3 +407,16 @@ def test_old_records_are_removed_before_the_devices_are_known(bench: Bench) -> N
     assert bench.run(moving(1)).outcome == "done"
     assert tidied == [0]
     assert "not_tidied" in [event for event, _ in bench.log.lines]
+
+
+def test_a_records_truth_is_of_its_own_session() -> None:
+    """What the world saw in earlier sessions is left out; where things are stays."""
+    testimony: dict[str, object] = {
+        "touches": [{"began_s": 3.0}, {"began_s": 7.0}],
+        "breaches": [{"t_s": 4.9}, {"t_s": 5.0}],
+        "registers": [1, 2],
+    }
+    assert truth_since(testimony, 5.0) == {
+        "touches": [{"began_s": 7.0}], "breaches": [{"t_s": 5.0}], "registers": [1, 2],
+    }  # fmt: skip
+    assert len(testimony["touches"]) == 2  # type: ignore[arg-type] # it stays whole
