@@ -1,6 +1,6 @@
 """`python -m legato` is the console script."""
 
-from legato.cli.main import main
+from legato.cli.entry import run
 
 if __name__ == "__main__":
-    main()
+    run()

@@ -1,21 +1,33 @@
-"""`legato pause resume stop estop reset reference shutdown`: one request, one answer."""
+"""`legato pause resume stop estop reset reference shutdown`: one request, one answer.
 
-from typing import Any
+Stop and estop go the stop line, and wait until the driver has confirmed them.
+"""
+
+import time
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from legato.cli.command import Context, command
+from legato.cli.exits import Exit
 from legato.cli.line import connected
+
+if TYPE_CHECKING:
+    from legato.daemon.client import Client
 
 REQUESTS = {
     "pause": "Retract at the next safe point and hold.",
     "resume": "Go on with the stroke that was broken off.",
-    "stop": "Finish the current short motion, retract, end the job as stopped.",
-    "estop": "Send the arm no further motion; fault. Never refused. No replacement for a "
-    "hardware stop.",
     "reset": "Leave fault once arm and camera answer.",
     "shutdown": "Stop what runs, let go of the devices, end the daemon.",
 }
+STOPS = {
+    "stop": "Finish the current short motion, retract, end the job as stopped.",
+    "estop": "Send the arm no further motion; fault. Never refused. No replacement for a "
+    "hardware stop.",
+}
+CONFIRM_S = 10.0  # how long a stop that is not confirmed at once is followed
+LOOK_S = 0.1
 
 
 def ask(context: Context, method: str, **params: Any) -> None:
@@ -37,6 +49,39 @@ def request_command(name: str, help_text: str) -> click.Command:
     return request
 
 
+def stop_command(name: str, help_text: str) -> click.Command:
+    """Return the command that stops by the stop line; exit 1 where the arm confirms nothing."""
+
+    @command(name, help=help_text)
+    def stop(context: Context) -> None:
+        with connected(context, line="stop") as client:
+            answer = client.call(name)
+            if answer.get("confirmed", 0.0) is None:
+                context.output.note(f"{name} given, not confirmed yet: {answer.get('reason')}")
+                answer = confirmed(client, answer)
+        context.output.document(answer)
+        if answer.get("confirmed", 0.0) is None:
+            text = f"{name} given, but NOT confirmed: {answer.get('reason')}; look at the arm"
+            context.output.say(text)
+            context.end(Exit.FAILED)
+        context.output.say(f"{name} confirmed: state {answer['state']}")
+
+    return stop
+
+
+def confirmed(client: "Client", answer: dict[str, Any]) -> dict[str, Any]:
+    """Return the answer to a stop as it stands when it is confirmed, or when the time is up."""
+    until = time.monotonic() + CONFIRM_S
+    while time.monotonic() < until:
+        last = client.call("ping").get("last") or {}
+        if last.get("received") != answer["received"]:
+            return answer
+        if last.get("confirmed") is not None:
+            return dict(last)
+        time.sleep(LOOK_S)
+    return answer
+
+
 @command("reference")
 @click.option("--xyz", nargs=3, type=float, metavar="X Y Z", help="Fingertip's place, mm.")
 @click.option("--pitch", type=float, help="Pitch of the hand, deg.")
@@ -55,4 +100,8 @@ def reference(
     ask(context, "reference", **{k: v for k, v in given.items() if v is not None})
 
 
-COMMANDS = (*(request_command(name, text) for name, text in REQUESTS.items()), reference)
+COMMANDS = (
+    *(request_command(name, text) for name, text in REQUESTS.items()),
+    *(stop_command(name, text) for name, text in STOPS.items()),
+    reference,
+)

@@ -18,20 +18,21 @@ from legato.cli.output import Output, write_error
 
 if TYPE_CHECKING:
     from legato.daemon.client import Client
+    from legato.daemon.keys import Keys
 
 
-def connect(requests: str, events: str | None) -> "Client":
-    """Return a client of the daemon at two endpoints."""
+def connect(requests: str, events: str | None, keys: "Keys | None" = None) -> "Client":
+    """Return a client of the daemon at two endpoints, encrypted where there are keys."""
     from legato.daemon.client import Client
 
-    return Client(requests, events)
+    return Client(requests, events, keys=keys)
 
 
 @dataclass(frozen=True)
 class Services:
     """What commands use of the outside; handed in as click's object, so that tests can too."""
 
-    connect: Callable[[str, str | None], "Client"] = connect
+    connect: Callable[..., "Client"] = connect
 
 
 @dataclass(frozen=True)
@@ -58,11 +59,12 @@ class LegatoCommand(click.Command):
         """Run the command; every error ends with a code of `Exit`."""
         try:
             return super().invoke(ctx)
-        except (click.exceptions.Exit, click.Abort, click.UsageError):
+        except (click.exceptions.Exit, click.UsageError):
             raise
+        except (KeyboardInterrupt, click.Abort):
+            self._end(ctx, Failure("interrupted"))
         except Exception as error:  # noqa: BLE001  # the boundary: a bug is shown, then exit 1
             failure = foreseen(error)
-            as_json = bool(ctx.params.get("as_json"))
             if failure is None:
                 traceback.print_exc()
                 failure = Failure(
@@ -70,15 +72,20 @@ class LegatoCommand(click.Command):
                     Exit.FAILED,
                     "report it with the lines above",
                 )
-            write_error(
-                sys.stderr,
-                failure.text,
-                failure.hint,
-                failure.code,
-                as_json=as_json,
-                stdout=sys.stdout,
-            )
-            ctx.exit(failure.code)
+            self._end(ctx, failure)
+
+    @staticmethod
+    def _end(ctx: click.Context, failure: Failure) -> NoReturn:
+        """Say a failure and end with its code."""
+        write_error(
+            sys.stderr,
+            failure.text,
+            failure.hint,
+            failure.code,
+            as_json=bool(ctx.params.get("as_json")),
+            stdout=sys.stdout,
+        )
+        ctx.exit(failure.code)
 
 
 def foreseen(error: Exception) -> Failure | None:

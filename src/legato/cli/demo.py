@@ -2,6 +2,8 @@
 
 import os
 import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,9 +21,11 @@ if TYPE_CHECKING:
     from legato.config.load import Loaded
     from legato.daemon.client import Client
     from legato.records.record import SessionRecord
+    from legato.records.store import Store, Summary
     from legato.report.score import Score
 
 PREFIX = ".demo-"
+DECIMALS = 6  # of the document's figures
 
 
 @dataclass(frozen=True)
@@ -55,18 +59,16 @@ def demo(context: Context, seed: int | None, engine: str | None, out: Path | Non
 
     shipped = load(context.config)
     state_dir = prepared(shipped, out)
-    config = derived(shipped, state_dir, seed, engine)
-    loaded = load(config)
-    log = config.with_suffix(".log")
-    record: SessionRecord | None = None
-    try:
+    store = Store(state_dir)
+    refuse_real_records(store)
+    with own_files(store) as (config, log):
+        derive(shipped, config, state_dir, seed, engine)
+        loaded = load(config)
         with daemon(config, log) as (_, client):
             ended = job(context, loaded, client)
-        record = Store(state_dir).read(ended.session)
+        record = store.read(ended.session)
         page = write_report(record, record.path / "report.html")
         show(context, ended, record, score(record), page)
-    finally:
-        keep(config, log, record)
     code = exit_of(ended.outcome)
     if code != Exit.DONE:
         context.end(code)
@@ -83,8 +85,69 @@ def prepared(loaded: "Loaded", out: Path | None) -> Path:
     return state_dir
 
 
-def derived(loaded: "Loaded", state_dir: Path, seed: int | None, engine: str | None) -> Path:
-    """Write the configuration of this demo and return its path."""
+def refuse_real_records(store: "Store") -> None:
+    """Raise Failure where a real cell keeps its records: its fault and its arm's place stay.
+
+    Told by state.json, by the latest session, and by the sessions of the fault or without an end.
+    """
+    from legato.records.errors import RecordError
+
+    state: dict[str, Any] = {}
+    with suppress(RecordError):  # the daemon begins anew where it cannot be read
+        state = store.load_state()
+    found = store.sessions()
+    fault = state.get("fault")
+    fault = fault if isinstance(fault, dict) else {}
+    latest = [s for s in found[:1] if is_real(s)]
+    held = [s for s in found if is_real(s) and (s.outcome is None or s.id == fault.get("session"))]
+    if state.get("simulated") is False or held or latest:
+        whose = f", such as session {(held + latest)[0].id}" if held or latest else ""
+        text = f"{store.state_dir} has the records of a real cell{whose}"
+        hint = "keep the demo's records elsewhere: --out DIR"
+        raise Failure(text, Exit.USAGE, hint)
+
+
+def is_real(session: "Summary") -> bool:
+    """Say whether a session was of a real cell; a damaged one does not tell."""
+    return not session.simulated and session.job != "unknown"
+
+
+@contextmanager
+def own_files(store: "Store") -> Iterator[tuple[Path, Path]]:
+    """Give the paths of this demo's configuration and log; they go however it ends.
+
+    Where a session began they move to its folder, so that the run can be repeated.
+    """
+    from legato.records.errors import RecordError
+
+    sweep(store.state_dir)
+    config = store.state_dir / f"{PREFIX}{os.getpid()}.toml"
+    log = config.with_suffix(".log")
+    before = {s.id for s in store.sessions()}
+    try:
+        yield config, log
+    finally:
+        with suppress(OSError, RecordError):
+            begun = [s.id for s in store.sessions() if s.id not in before]
+            for file, name in ((config, "demo.toml"), (log, "daemon.log")):
+                if begun and file.exists():
+                    file.replace(store.folder / begun[0] / name)
+        for file in (config, log):
+            file.unlink(missing_ok=True)
+
+
+def sweep(folder: Path) -> None:
+    """Remove the files of demos that were killed: their process is no more."""
+    for file in folder.glob(f"{PREFIX}*"):
+        pid = file.stem.removeprefix(PREFIX)
+        if pid.isdecimal() and not Path("/proc", pid).exists():
+            file.unlink(missing_ok=True)
+
+
+def derive(
+    loaded: "Loaded", path: Path, state_dir: Path, seed: int | None, engine: str | None
+) -> None:
+    """Write the configuration of this demo."""
     from legato.config.toml import dumps
 
     data = {name: dict(table) for name, table in loaded.data.items()}
@@ -95,30 +158,29 @@ def derived(loaded: "Loaded", state_dir: Path, seed: int | None, engine: str | N
         data["sim"]["seed"] = seed
     if engine is not None:
         data["calibration"]["engine"] = engine
-    path = state_dir / f"{PREFIX}{os.getpid()}.toml"
     path.write_text(dumps(data, f"Made by `legato demo` from {loaded.path}."), encoding="utf-8")
-    return path
 
 
 def job(context: Context, loaded: "Loaded", client: "Client") -> Ended:
     """Return how the job ended: the arm is referenced, then the whole job is run and followed.
 
-    A fault that an earlier session left is reset: a simulated world begins anew with its daemon.
+    A fault that an earlier session left is reset: a simulated world begins anew with its daemon,
+    and its arm with it. So the arm is referenced where that world truly puts it.
     """
-    out, home = context.output, loaded.config.robot.home
+    out, sim = context.output, loaded.config.sim
     fault = client.call("status").get("fault")
     if fault:
         out.note(f"left by an earlier session, and reset: {fault.get('text')}")
         client.call("reset")
     client.call(
         "reference",
-        xyz_mm=list(home.xyz_mm),
-        pitch_deg=home.pitch_deg,
-        roll_deg=home.roll_deg,
+        xyz_mm=list(sim.arm_at_mm),
+        pitch_deg=sim.arm_pitch_deg,
+        roll_deg=sim.arm_roll_deg,
     )
     began = time.monotonic()
     session = str(client.call("run")["session"])
-    out.note(f"run: session {session}, simulated cell, seed {loaded.config.sim.seed}")
+    out.note(f"run: session {session}, simulated cell, seed {sim.seed}")
     answer = follow(client, session, out)
     return Ended(session, str(answer["outcome"]), answer.get("reason"), time.monotonic() - began)
 
@@ -148,7 +210,7 @@ def show(
         "seconds": ended.seconds,
         "report": str(page),
     }
-    out.document(document)
+    out.document(rounded(document))
     columns = ("station mm", "predicted z mm", "touched z mm", "along the leg mm", "error mm")
     rows = [
         (f"{s.station_mm:g}", s.predicted_z_mm, s.touched_z_mm, s.place_mm, s.error_mm)
@@ -169,14 +231,13 @@ def show(
     out.say(f"report: {page}")
 
 
-def keep(config: Path, log: Path, record: "SessionRecord | None") -> None:
-    """Move configuration and log to the session's folder, so that the run can be repeated.
-
-    Without a session the log stays where it is, and the configuration goes.
-    """
-    if record is None:
-        config.unlink(missing_ok=True)
-        return
-    config.replace(record.path / "demo.toml")
-    if log.exists():
-        log.replace(record.path / "daemon.log")
+def rounded(value: Any) -> Any:
+    """Return JSON-able data with its numbers to `DECIMALS`."""
+    match value:
+        case float():
+            return round(value, DECIMALS)
+        case Mapping():
+            return {key: rounded(inner) for key, inner in value.items()}
+        case list():
+            return [rounded(inner) for inner in value]
+    return value

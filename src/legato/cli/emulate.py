@@ -4,6 +4,8 @@ import json
 import os
 import signal
 import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,13 +17,13 @@ from legato.cli.exits import Exit, Failure
 
 if TYPE_CHECKING:
     from legato.config.load import Loaded
-    from legato.drivers.emulator import Emulator, Fault, PseudoTerminal
+    from legato.drivers.emulator import Emulator, Fault
     from legato.drivers.sim.arm import SimArm
 
 BAUDS = ("110", "150", "300", "600", "1200", "2400", "4800", "9600")
 FAULTS = """\b
 Faults: silence, late, garbage, 0 (refused), 2 (STOP on the pendant), hang-up,
-lost-steps, stuck-open, stuck-closed. Keys, joined by commas:
+restart, lost-steps, stuck-open, stuck-closed. Keys, joined by commas:
   after=N commands, at=SECONDS, or p=PROBABILITY of each command
   on=step (default), read or any: which commands count
   by=seconds late or away, or half-steps lost; motor=1..6 that loses them
@@ -82,17 +84,17 @@ def emulate(
     from legato.config.load import load
 
     parsed = parsed_faults(faults)
+    if link is not None:
+        check_link(link)
     loaded = load(context.config, need_intrinsics=False)
     stopping = threading.Event()
     arm, emulator = build(loaded, time_scale, int(baud) if baud else None, parsed, seed, stopping)
     told = Told(context, arm, emulator, link, truth)
-    # The signals wait for sigwait below; threads inherit the mask.
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    try:
-        run(told, stopping)
-    finally:
-        told.unlink()
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    with signals() as next_signal:
+        try:
+            run(told, stopping, next_signal)
+        finally:
+            told.unlink()
 
 
 def parsed_faults(texts: tuple[str, ...]) -> tuple["Fault", ...]:
@@ -195,15 +197,20 @@ class Told:
             self.context.output.say(f"breach: {breach['what']}")
 
 
-def run(told: Told, stopping: threading.Event) -> None:
-    """Serve the line on a thread of its own until a signal ends it; tell the truth at the end."""
+def run(told: Told, stopping: threading.Event, next_signal: Callable[[], int]) -> None:
+    """Serve the line on a thread of its own until a signal ends it; tell the truth at the end.
+
+    SIGINT and SIGTERM end it, and at each SIGUSR1 the truth so far is told.
+    """
     from legato.drivers.emulator import PseudoTerminal
 
     with PseudoTerminal(told.emulator, told.port) as line:
         thread = threading.Thread(target=line.serve, name="line")
         thread.start()
         try:
-            wait(told, line)
+            while next_signal() == signal.SIGUSR1:
+                with line.busy:
+                    told.happened()
         finally:
             stopping.set()
             line.stop()
@@ -211,17 +218,31 @@ def run(told: Told, stopping: threading.Event) -> None:
         told.happened()
 
 
-def wait(told: Told, line: "PseudoTerminal") -> None:
-    """Return when SIGINT or SIGTERM comes; tell the truth at each SIGUSR1."""
-    while signal.sigwait(SIGNALS) == signal.SIGUSR1:
-        with line.busy:
-            told.happened()
+@contextmanager
+def signals() -> Iterator[Callable[[], int]]:
+    """Give a wait for the next of SIGNALS, whichever thread it reaches the process on."""
+    receive, send = os.pipe()
+    os.set_blocking(send, False)
+    before = {number: signal.signal(number, lambda *_: None) for number in SIGNALS}
+    wake = signal.set_wakeup_fd(send)
+    try:
+        yield lambda: os.read(receive, 1)[0]
+    finally:
+        signal.set_wakeup_fd(wake)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        os.close(receive)
+        os.close(send)
+
+
+def check_link(link: Path) -> None:
+    """Raise Failure where a link cannot be put because something else is in its place."""
+    if link.exists() and not link.is_symlink():
+        raise Failure(f"{link} exists and is no link", Exit.USAGE, "name another --link")
 
 
 def relink(link: Path, path: str) -> None:
-    """Point a symbolic link at a path; raises Failure where something else is in its place."""
-    if link.exists() and not link.is_symlink():
-        raise Failure(f"{link} exists and is no link", Exit.USAGE, "name another --link")
+    """Point a symbolic link at a path."""
     fresh = link.with_name(f".{link.name}.{os.getpid()}")
     fresh.symlink_to(path)
     fresh.replace(link)

@@ -26,13 +26,28 @@ def line_of(topic: str, event: Mapping[str, Any]) -> str:
             reason = f": {event['reason']}" if event.get("reason") else ""
             return f"{event.get('job')} {event.get('id')} {outcome}{reason}"
         case "telemetry":
-            place = event.get("xyz_mm") or []
-            return "at " + ", ".join(f"{v:.1f}" for v in place) + " mm"
+            return _telemetry(event)
+        case "heartbeat":
+            return f"{event.get('state')}, up {_figure(event, 'uptime_s', '.0f')} s"
         case _:
             return ", ".join(f"{k} {v}" for k, v in event.items() if k not in HEAD)
 
 
 HEAD = ("boot", "seq", "t", "session")
+
+
+def _telemetry(event: Mapping[str, Any]) -> str:
+    """Return where the arm is, what for, and whether it touches."""
+    arm = event.get("arm") or {}
+    place = arm.get("xyz_mm")
+    parts = ["at " + ", ".join(f"{v:.1f}" for v in place) + " mm" if place else "place not known"]
+    if event.get("why"):
+        parts.append(str(event["why"]))
+    if event.get("station_mm") is not None:
+        parts.append(f"station {_figure(event, 'station_mm', 'g')} mm")
+    if arm.get("contact"):
+        parts.append("contact")
+    return ", ".join(parts)
 
 
 def _figure(event: Mapping[str, Any], key: str, form: str) -> str:

@@ -35,12 +35,13 @@ HINT = "take at least ten sharp pictures with face and side in view, each from a
 def intrinsics(context: Context, images: tuple[Path, ...], file: Path) -> None:
     """Calibrate the camera from IMAGES of the leg in ten or more poses, and write --out.
 
-    A picture that cannot be used is named and left out.
+    A picture that cannot be used is named and left out; a file that is not there is an error.
     """
     from legato.config.intrinsics import write_intrinsics
     from legato.config.load import load
 
     loaded = load(context.config, need_intrinsics=False)
+    refuse_missing(images)
     used, left_out = find_views(context, loaded, images)
     result = calibrate(context, loaded, used, left_out)
     if not result.converged or result.rms_px > loaded.config.calibration.max_rms_px:
@@ -50,6 +51,14 @@ def intrinsics(context: Context, images: tuple[Path, ...], file: Path) -> None:
     created = datetime.now(UTC).isoformat(timespec="seconds")
     write_intrinsics(file, result.known, views=len(used), rms_px=result.rms_px, created=created)
     show(context, result, file, used, left_out)
+
+
+def refuse_missing(images: Sequence[Path]) -> None:
+    """Raise Failure for files that are not there: a slip of the pen, not a bad picture."""
+    missing = [str(path) for path in images if not path.exists()]
+    if missing:
+        text = f"there is no file {', '.join(missing)}"
+        raise Failure(text, Exit.USAGE, "see that every picture's name is right")
 
 
 def find_views(

@@ -8,22 +8,39 @@ from legato.cli.command import Context
 from legato.cli.exits import Exit, Failure
 
 if TYPE_CHECKING:
+    from legato.config.schema import ServerTable
     from legato.daemon.client import Client
 
 
 @contextmanager
-def connected(context: Context, *, events: bool = False) -> "Iterator[Client]":
-    """Give a client of the configured daemon, with its events where they are wanted."""
-    from legato.config.endpoints import has_fixed_port
+def connected(
+    context: Context, *, events: bool = False, line: str = "requests"
+) -> "Iterator[Client]":
+    """Give a client of the configured daemon, with its events where they are wanted.
+
+    `line` is `requests`, or `stop` for the line that only stops.
+    """
     from legato.config.load import load_server
+    from legato.daemon.keys import client_keys
 
     server = load_server(context.config)
-    for name, endpoint in (("requests", server.requests), ("events", server.events)):
-        if not has_fixed_port(endpoint):
-            hint = f"set server.{name} to a fixed port"
-            raise Failure(f"server.{name} = {endpoint} says no port", Exit.USAGE, hint)
-    client = context.services.connect(server.requests, server.events if events else None)
+    asked = _fixed(server, line)
+    heard = _fixed(server, "events") if events else None
+    keys = client_keys(server, context.config or "the configuration")
+    given = (asked, heard) if keys is None else (asked, heard, keys)
+    client = context.services.connect(*given)
     try:
         yield client
     finally:
         client.close()
+
+
+def _fixed(server: "ServerTable", name: str) -> str:
+    """Return where a client finds one of the daemon's lines."""
+    from legato.config.endpoints import has_fixed_port, reachable
+
+    endpoint = str(getattr(server, name))
+    if not has_fixed_port(endpoint):
+        hint = f"set server.{name} to a fixed port"
+        raise Failure(f"server.{name} = {endpoint} says no port", Exit.USAGE, hint)
+    return reachable(endpoint)

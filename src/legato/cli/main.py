@@ -10,6 +10,7 @@ from legato.cli.detect import detect
 from legato.cli.emulate import emulate
 from legato.cli.exits import EPILOG
 from legato.cli.intrinsics import intrinsics
+from legato.cli.keygen import keygen
 from legato.cli.report import report
 from legato.cli.serve import serve
 from legato.cli.sessions import sessions
@@ -39,6 +40,6 @@ def main() -> None:
 
 for item in (
     demo, serve, status, *jobs.COMMANDS, *act.COMMANDS, watch, sessions, report,
-    detect, solve, intrinsics, snapshot, emulate, check,
+    detect, solve, intrinsics, snapshot, emulate, keygen, check,
 ):  # fmt: skip
     main.add_command(item)

@@ -21,6 +21,9 @@ def report(context: Context, session: str | None, out: Path | None, state_dir: P
     """Write the report of SESSION, by default the latest, and print its path."""
     from legato.report.html import write_report
 
+    if out is not None and not out.absolute().parent.is_dir():
+        hint = "make it first, or name a file in another folder"
+        raise Failure(f"{out}: there is no folder {out.parent}", Exit.USAGE, hint)
     store = opened_store(context, state_dir)
     if session is None:
         found = store.sessions()

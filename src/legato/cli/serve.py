@@ -1,5 +1,7 @@
 """`legato serve`: the daemon in the foreground."""
 
+import os
+
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit
 
@@ -10,6 +12,8 @@ def serve(context: Context) -> None:
 
     It logs to stderr: JSON lines where that is no terminal, `ready` with its addresses first.
     """
+    # Before numpy is loaded: its threads would cost start and memory, and nothing here needs them.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from legato.config.load import load
     from legato.daemon.serve import serve as run
 

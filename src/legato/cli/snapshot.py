@@ -45,6 +45,7 @@ def snapshot(
     from legato.vision.picture import encode_png
 
     loaded = load(context.config, need_intrinsics=False)
+    refuse_overwriting(out)
     out.mkdir(parents=True, exist_ok=True)
     files = []
     for number in range(1, views + 1):
@@ -61,6 +62,14 @@ def snapshot(
         files.append(str(file))
         context.output.note(str(file))
     context.output.document({"files": files})
+
+
+def refuse_overwriting(folder: Path) -> None:
+    """Raise Failure where a folder has pictures of an earlier snapshot."""
+    there = sorted(folder.glob("view-*.png"))
+    if there:
+        text = f"{folder} has {len(there)} pictures already, such as {there[0].name}"
+        raise Failure(text, Exit.USAGE, "name another folder with --out, or move them away")
 
 
 def simulated_view(loaded: "Loaded", seed: int, scatter_mm: float, scatter_deg: float) -> "Image":

@@ -70,8 +70,9 @@ def chosen(loaded: Any, engine: str | None, marks: str | None) -> "CellSettings"
         wrong = [n for n in names if n not in settings.leg.marks]
         if wrong or not names or len(set(names)) < len(names):
             known = ", ".join(settings.leg.marks)
-            what = f"the leg has no mark {', '.join(wrong)}" if wrong else "each mark once"
-            raise Failure(f"--marks {marks}: {what}", Exit.USAGE, f"the leg's marks are {known}")
+            what = f"the leg has no mark {', '.join(wrong)}" if wrong else "name each mark once"
+            what = what if names else "it names no mark"
+            raise Failure(f"--marks {marks!r}: {what}", Exit.USAGE, f"the leg's marks are {known}")
         table = structs.replace(table, marks=names)
     return replace(settings, calibration=table)
 

@@ -24,6 +24,7 @@ TONES = {"done": "good", "stopped": "calm", "refused": "warn", "fault": "bad", "
 UNITS = {"f": "mm", "s_x": "px/mm", "s_y": "px/mm", "u0": "px", "v0": "px"} | dict.fromkeys(
     ("t_x", "t_y", "t_z"), "mm"
 )
+APART = ("f", "s_x", "s_y")  # only f s_x = alpha_u and f s_y = alpha_v can be told
 STOPPED = {
     "converged": "stopped because the pose had converged",
     "stalled": "stopped because the pose no longer changed",
@@ -101,7 +102,8 @@ def search(solved: Mapping[str, Any]) -> list[str]:
     if solved.get("generations") is not None:
         why = str(solved.get("stopped_by"))
         found.append(f"{solved['generations']} generations, {STOPPED.get(why, why)}")
-    if solved.get("agreement") is not None:
+    # The paper's engine refines no candidates that could agree.
+    if solved.get("agreement") is not None and solved.get("engine") != "paper":
         share = 100.0 * float(solved["agreement"])
         found.append(f"{share:.0f} % of the refined candidates agree on the optimum")
     if solved.get("seconds") is not None:
@@ -135,23 +137,43 @@ def residuals(solved: Mapping[str, Any]) -> list[Row]:
 
 
 def parameters(solved: Mapping[str, Any]) -> list[Row]:
-    """Return the 11 genes beside their bounds and the paper's table 5.3."""
+    """Return the 11 genes beside their bounds and the paper's table 5.3.
+
+    What a known camera gives has no bounds; its f, s_x and s_y have no values of their own, and
+    alpha_u and alpha_v stand after them.
+    """
     rows = []
+    known = solved.get("intrinsics") == "known"
     for gene in solved.get("parameters") or ():
-        name, low, high = gene["name"], gene["low"], gene["high"]
-        inside = low is not None and high is not None and high > low
-        share = (gene["value"] - low) / (high - low) if inside else None
-        bounds = PAPER_BOUNDS.get(name)
+        name = gene["name"]
+        low, high = (gene["low"], gene["high"]) if gene["searched"] else (None, None)
+        share, own = None, False
+        if low is not None and high is not None and high > low:
+            share = float(np.clip((gene["value"] - low) / (high - low), 0.0, 1.0))
+            own = name in PAPER_BOUNDS and not np.allclose(PAPER_BOUNDS[name], (low, high))
         rows.append(
             {
                 **gene,
+                "value": None if known and name in APART else gene["value"],
+                "low": low,
+                "high": high,
+                "on_bound": gene["on_bound"] and gene["searched"],
                 "unit": UNITS.get(name, "rad"),
-                "share": None if share is None else float(np.clip(share, 0.0, 1.0)),
+                "share": share,
                 "paper": TABLE_5_3.get(name),
-                "own_bounds": bounds is not None and not np.allclose(bounds, (low, high)),
+                "own_bounds": own,
             }
         )
+        if known and name == APART[-1]:
+            rows += [_product(solved, alpha) for alpha in ("alpha_u", "alpha_v")]
     return rows
+
+
+def _product(solved: Mapping[str, Any], name: str) -> Row:
+    """Return the row of a known camera's focal length in px."""
+    nothing = dict.fromkeys(("sigma", "low", "high", "share", "paper"))
+    flags = {"on_bound": False, "own_bounds": False, "searched": False}
+    return {"name": name, "value": solved.get(name), "unit": "px", **nothing, **flags}
 
 
 def contacts(record: SessionRecord) -> list[Row]:

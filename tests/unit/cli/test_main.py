@@ -1,14 +1,17 @@
 """What holds for every command: help with exit codes, light imports, errors in one line."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 import click
 import pytest
 from click.testing import CliRunner
 
 from legato.cli.command import Context, command, foreseen, refused
+from legato.cli.entry import run as console
 from legato.cli.exits import EPILOG, Exit, Failure
 from legato.cli.main import main
 from legato.config.errors import ConfigError
@@ -114,3 +117,43 @@ def test_a_bug_shows_its_traceback_and_ends_with_1() -> None:
     assert result.exit_code == 1
     assert "Traceback" in result.stderr
     assert "legato: a bug: ZeroDivisionError: by design" in result.stderr
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_ctrl_c_while_the_command_line_loads_is_one_line(
+    as_json: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before any command is known: code 1, no traceback, and the document where it is wanted."""
+
+    def interrupted() -> NoReturn:
+        raise KeyboardInterrupt
+
+    with pytest.raises(SystemExit) as ended:
+        console(interrupted, ["legato", "demo", *(["--json"] if as_json else [])])
+    said = capsys.readouterr()
+    assert (ended.value.code, said.err) == (1, "legato: interrupted\n")
+    if as_json:
+        assert json.loads(said.out)["error"]["exit"] == 1
+    else:
+        assert said.out == ""
+
+
+def test_the_console_script_loads_little_before_it_meets_ctrl_c() -> None:
+    """Its module brings in neither click nor any command."""
+    look = "import sys, legato.cli.entry; print('click' in sys.modules, 'rich' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False"]
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, click.Abort])
+def test_ctrl_c_in_a_command_is_one_line_and_one_document(error: type[BaseException]) -> None:
+    """Also at a question: code 1, without a traceback, and JSON where it was asked for."""
+
+    @command("long")
+    def long(context: Context) -> None:
+        del context
+        raise error
+
+    result = CliRunner().invoke(long, ["--json"])
+    assert (result.exit_code, result.stderr) == (1, "legato: interrupted\n")
+    assert document(result)["error"] == {"text": "interrupted", "hint": "", "exit": 1}

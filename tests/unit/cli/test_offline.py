@@ -52,6 +52,26 @@ def test_snapshots_differ_in_pose_and_repeat_by_seed(views: Path, cell: Path) ->
     assert (views / "view-002.png").read_bytes() != first
 
 
+def test_snapshots_are_never_overwritten(cell: Path, views: Path) -> None:
+    """A folder with pictures of an earlier time is refused, with what to do; they stay."""
+    before = (views / "view-001.png").read_bytes()
+    options = ("--out", views, "--views", "1", "--seed", "5")
+    result = run("snapshot", "--config", cell, *options)
+    assert result.exit_code == Exit.USAGE
+    assert "view-001.png" in result.stderr
+    assert "another folder" in result.stderr
+    assert (views / "view-001.png").read_bytes() == before
+
+
+def test_a_picture_that_is_not_there_is_a_slip(cell: Path, views: Path, tmp_path: Path) -> None:
+    """A wrong file name ends with 2 and names it, before anything is computed."""
+    files = [*sorted(views.glob("*.png")), tmp_path / "none.png"]
+    result = run("intrinsics", "--config", cell, *files, "--out", tmp_path / "found.toml")
+    assert result.exit_code == Exit.USAGE
+    assert "none.png" in result.stderr
+    assert "view-001.png" not in result.stderr
+
+
 def test_intrinsics_are_found_from_snapshots(cell: Path, views: Path, tmp_path: Path) -> None:
     """From the pictures the true camera is found within its sigmas; the blank one is named."""
     out = tmp_path / "found.toml"
@@ -73,7 +93,7 @@ def test_too_few_pictures_are_refused_by_name(cell: Path, views: Path, tmp_path:
     torn = tmp_path / "torn.png"
     torn.write_bytes((views / "view-001.png").read_bytes()[:5000])
     out = tmp_path / "found.toml"
-    wrong = [views / "blank.png", torn, tmp_path / "none.png"]
+    wrong = [views / "blank.png", torn]
     result = run("intrinsics", "--config", cell, *wrong, "--out", out)
     assert result.exit_code == Exit.REFUSED
     for file in wrong:
@@ -141,10 +161,11 @@ def test_solve_refuses_what_gives_no_pose(cell: Path, views: Path, picture: Path
 
 def test_solve_refuses_marks_that_the_leg_has_not(cell: Path, picture: Path) -> None:
     """A wrong name is a wrong command line, with the names that there are."""
-    for marks in ("P1,P99", "P1,P1", ","):
+    for marks, why in (("P1,P99", "P99"), ("P1,P1", "once"), (",", "no mark"), ("", "no mark")):
         result = run("solve", picture, "--config", cell, "--marks", marks)
         assert result.exit_code == Exit.USAGE
         assert "P10" in result.stderr
+        assert why in result.stderr
 
 
 def test_check_is_content_with_the_simulated_cell(cell: Path) -> None:
@@ -160,7 +181,7 @@ def test_check_names_what_is_missing_and_what_to_do(tmp_path: Path) -> None:
     """Absent devices, an unwritable place and a full disk are each told, with code 1."""
     (tmp_path / "file").touch()
     cell = write_cell(tmp_path)
-    text = cell.read_text().replace('"state"', '"file/state"\nmin_free_mb = 999999999999')
+    text = cell.read_text().replace('"state"', '"file/state"\nmin_free_mb = 10000000')
     text = text.replace("[camera]", "[camera]\ndriver = 'opencv'\nsource = 'no-camera'")
     cell.write_text(text + "[robot]\ndriver = 'teachmover'\nport = '/dev/none'\n")
     result = run("check", "--config", cell)
@@ -233,3 +254,11 @@ def test_a_session_that_is_not_there_is_an_error_in_words(cell: Path) -> None:
     empty = run("report", "--state-dir", cell.parent / "elsewhere")
     assert empty.exit_code == Exit.FAILED
     assert "legato demo" in empty.stderr
+
+
+def test_a_report_makes_no_folders(cell: Path, tmp_path: Path) -> None:
+    """A folder that is not there is a slip of the pen: refused, and nothing is made."""
+    result = run("report", "--config", cell, "--out", tmp_path / "new" / "page.html")
+    assert result.exit_code == Exit.USAGE
+    assert f"no folder {tmp_path / 'new'}" in result.stderr
+    assert not (tmp_path / "new").exists()

@@ -207,6 +207,21 @@ def test_watch_prints_events_as_lines(cell: Path) -> None:
     assert lines[5]["topic"] == "heartbeat"
 
 
+def test_watch_shows_what_telemetry_and_heartbeats_hold(cell: Path) -> None:
+    """The arm's place stands in `arm`, unknown before it is referenced; heartbeats tell state."""
+    arm = {"xyz_mm": [1.0, 2.25, 3.0], "contact": True}
+    batch = [
+        event("telemetry", 1, arm=arm, station_mm=67.0, why="press"),
+        event("telemetry", 2, arm={"xyz_mm": None, "contact": False}, station_mm=None, why=None),
+        event("heartbeat", 3, state="idle", uptime_s=12.3),
+    ]
+    result = run("watch", "--config", cell, "--all", "--count", "3", daemon=FakeDaemon({}, [batch]))
+    first, second, third = result.stdout.splitlines()
+    assert first.endswith("at 1.0, 2.2, 3.0 mm, press, station 67 mm, contact")
+    assert second.endswith("place not known")
+    assert third.endswith("idle, up 12 s")
+
+
 def test_watch_ends_quietly_on_ctrl_c(cell: Path) -> None:
     """Ctrl-C is how a watch ends: code 0, no traceback."""
     daemon = job("done")

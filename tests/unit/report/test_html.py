@@ -6,12 +6,15 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib import rcParams
 
 from legato.records.chain import EVENTS
 from legato.records.record import SessionRecord, read_session
 from legato.records.store import Store
+from legato.report.facts import parameters
+from legato.report.figures.picture import runs
 from legato.report.html import number, render, write_report
 from tests.unit.report.sessions import CONFIG, STATIONS, begun
 
@@ -238,6 +241,37 @@ def test_paper_engine_without_known_camera(tmp_path: Path) -> None:
     assert "Engine paper" in text
     assert "on its bound" in text
     assert "known, not searched" not in text
+    assert "alpha_u" not in [row["name"] for row in parameters(solved)]
+    assert "100 %" not in text
+    assert "candidates agree" not in text
+
+
+def test_a_known_camera_has_no_bounds_to_be_out_of(whole: SessionRecord, whole_page: str) -> None:
+    """f, s_x and s_y are told as known, alpha_u and alpha_v in px; only the pose has bounds."""
+    rows = {row["name"]: row for row in parameters(whole.calibration or {})}
+    assert list(rows)[:5] == ["f", "s_x", "s_y", "alpha_u", "alpha_v"]
+    assert [rows[n]["value"] for n in ("f", "s_x", "s_y")] == [None, None, None]
+    assert (rows["alpha_u"]["value"], rows["alpha_v"]["value"]) == (652.0, 655.0)
+    for name in ("f", "s_x", "s_y", "alpha_u", "alpha_v", "u0", "v0"):
+        assert (rows[name]["low"], rows[name]["share"], rows[name]["on_bound"]) == (
+            None,
+            None,
+            False,
+        )
+    assert rows["t_z"]["share"] is not None
+    text = Page(whole_page).text
+    assert "f mm known" in text
+    assert "alpha_u px 652.000" in text
+    assert "100 % of the refined candidates agree" in text
+
+
+def test_the_first_motion_is_drawn_from_a_reading_before_it() -> None:
+    """A row that is no motion tells where the arm stood; without one nothing is made up."""
+    places = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
+    from_reading = runs(np.array(["", "transit", "transit"]), places, "transit")
+    assert from_reading[:3].tolist() == places.tolist()
+    without = runs(np.array(["transit", "transit", "press"]), places, "transit")
+    assert without[:2].tolist() == places[:2].tolist()
 
 
 @pytest.mark.parametrize(
