@@ -3,7 +3,7 @@
 import importlib
 import sys
 
-NAMES = ("paper", "demo", "line", "passes")
+NAMES = ("calibration", "paper", "demo", "line", "daemon", "passes")
 
 
 def main(names: list[str]) -> int:

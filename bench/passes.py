@@ -12,8 +12,8 @@ import numpy as np
 from bench.row import Row, keep
 from legato.control import effects as do
 from legato.control.perceive import Calibration
+from legato.control.rehearsal import dry_run
 from legato.control.settings import CellSettings
-from legato.control.verify import dry_run
 from legato.geometry.arm import forward, joints_from_steps
 from legato.geometry.motion import StepMove
 from legato.geometry.transforms import Array, apply, rotation_from_vector, transform

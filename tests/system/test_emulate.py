@@ -15,8 +15,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from legato.cli.child import daemon
+from legato.cli.exits import Exit
+from legato.cli.main import main
 from legato.config.load import load
 from legato.config.toml import dumps
 from legato.daemon.client import Client, RpcError
@@ -155,3 +158,50 @@ def test_the_link_goes_with_the_emulator(tmp_path: Path) -> None:
     assert cell.end() == 0
     assert not (tmp_path / "arm").is_symlink()
     assert json.loads((tmp_path / "truth.json").read_text())["simulated"] is True
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--fault", "smoke"], "no fault 'smoke'"),
+        (["--fault", "silence:p=2"], "p is 0 to 1"),
+        (["--time-scale", "0"], "--time-scale"),
+        (["--baud", "14400"], "--baud"),
+        (["--link", __file__], "is no link"),
+        (["--config", "no-such.toml"], "no-such.toml"),
+    ],
+)
+def test_wrong_words_are_refused_before_a_port_is_made(options: list[str], says: str) -> None:
+    """Exit 2 with what is wrong, and nothing on stdout but that."""
+    result = CliRunner().invoke(main, ["emulate", *options])
+    assert result.exit_code == Exit.USAGE
+    assert result.stdout == ""
+    assert says in result.stderr
+
+
+def test_without_a_file_the_truth_is_a_line_of_its_own(tmp_path: Path) -> None:
+    """With --json the port comes first and the truth last; SIGINT ends it as well as SIGTERM."""
+    config = configuration(tmp_path)
+    command = [sys.executable, "-m", "legato.cli.leash", "emulate", "--config", str(config)]
+    env = os.environ | {"LEGATO_PARENT": str(os.getpid())}
+    with subprocess.Popen([*command, "--json"], env=env, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert list(json.loads(process.stdout.readline())) == ["port"]
+        process.send_signal(signal.SIGINT)
+        (line,) = process.communicate(timeout=20.0)[0].splitlines()
+    assert process.returncode == 0
+    assert json.loads(line)["truth"]["touches"] == []
+
+
+def test_a_late_reply_does_not_hold_up_the_end(tmp_path: Path) -> None:
+    """SIGTERM cuts every wait short, whatever the emulator is at."""
+    cell = Cell(tmp_path, "late:by=100000,on=read")
+    fd = os.open(tmp_path / "arm", os.O_RDWR | os.O_NOCTTY)
+    try:
+        os.write(fd, b"@RESET\r")
+        assert os.read(fd, 1) == b"1"
+        os.write(fd, b"@READ\r")
+        assert cell.end() == 0
+    finally:
+        os.close(fd)
+    assert json.loads((tmp_path / "truth.json").read_text())["account"]["commands"]["other"] == 1
