@@ -1,7 +1,9 @@
 """Calibration without pictures: optima, bounds, times, trust, intrinsics; about five minutes."""
 
+import math
 import os
 from dataclasses import replace
+from typing import Any
 
 from bench.row import RESULTS, Row, keep
 
@@ -23,9 +25,16 @@ def run() -> list[Row]:
     rows = [*accuracy.rows(table), *speed.rows(times, sizes, pairs), *trust_rows, *lens_rows]
     # numpy's numbers compare to numpy's booleans, which JSON does not know.
     rows = [replace(row, value=float(row.value)) for row in rows]
-    keep(
-        "calibration", rows, accuracy=table, times=times, populations=sizes, **trust_more,
-        **lens_more,
-    )  # fmt: skip
+    more = {"accuracy": table, "times": times, "populations": sizes, **trust_more, **lens_more}
+    keep("calibration", rows, **plain(more))
     chart.draw(RESULTS / "calibration.png", table, times, sizes)
     return rows
+
+
+def plain(value: Any) -> Any:
+    """Return a document with None for what is not finite: JSON has no word for it."""
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -28,6 +28,8 @@ def draw(
     line = [sizes[numbers[0]] * n / numbers[0] for n in numbers]
     size.loglog(numbers, line, "--", color="grey", label="in proportion to the population")
     size.set(xlabel="population", ylabel="ms", title="Cost of a population")
+    size.set_xticks(numbers, [str(n) for n in numbers])
+    size.minorticks_off()
     size.legend()
     figure.savefig(path, dpi=110, metadata={"Software": None})
 
@@ -47,9 +49,12 @@ def _errors(
         places = [k + (i - (len(names) - 1) / 2) * width for k in range(len(cells))]
         axes.bar(places, ratios, width, yerr=bars, label=name)
     axes.axhline(1.0, color="black", linewidth=0.8)
-    axes.set_xticks(range(len(cells)), [c.rsplit(",", 1)[0].replace(", ", "\n") for c in cells])
-    axes.set(ylabel="translation rms / bound (cut at 3)", title=f"Intrinsics {kind}")
-    axes.legend(fontsize=8)
+    short = [c.rsplit(",", 1)[0].replace("best seven", "7").replace("ten", "10") for c in cells]
+    axes.set_xticks(range(len(cells)), [c.replace(", ", "\n") for c in short])
+    axes.set(
+        ylabel="translation rms / bound (cut at 3)", title=f"Intrinsics {kind}: marks and noise"
+    )
+    axes.legend(fontsize=8, loc="lower center")
 
 
 def _times(axes: Any, times: Mapping[str, Mapping[str, Mapping[str, float]]]) -> None:

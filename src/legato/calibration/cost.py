@@ -31,8 +31,8 @@ class Model:
 
     `weights` (M,) are sigma / sigma_of_mark, where `sigma` px is the harmonic reference: equal
     marks weigh 1, and costs stay in px^2. `search` (2, 11) bounds the genetic search, `box` (2, 11)
-    the refinement of `tied` genes; genes that `wrap` run round the whole circle. `prior` (11, 11) is information
-    in units of 1 / sigma^2 about `mean` (11,), or None.
+    the refinement of `tied` genes; genes that `wrap` run round the whole circle. `prior` (11, 11)
+    is information in units of 1 / sigma^2 about `mean` (11,), or None.
     """
 
     points: Array

@@ -67,9 +67,9 @@ def refine(
     going = np.flatnonzero(np.isfinite(value))
     taken = 0
     while going.size and taken < rounds:
-        if enough is not None and len(genes) - going.size >= max(enough, ended):
-            if _met(value, converged) >= enough:
-                break
+        over = len(genes) - going.size
+        if enough is not None and over >= ended and _met(value, converged) >= enough:
+            break
         taken += 1
         now = genes[going]
         step, decrease = _step(now[:, free], box, hessian[going], gradient[going], damping[going])

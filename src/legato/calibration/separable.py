@@ -12,7 +12,7 @@ from legato.calibration.problem import EngineSettings, Problem, Solution
 from legato.geometry.transforms import Array
 
 # Four genes, or three, need fewer generations than eleven or six, and fewer elites.
-SHORTER, WIDE_ELITES = 3, 16
+SHORTER, WIDE_ELITES = 5, 16
 
 
 def solve_separable(

@@ -59,8 +59,9 @@ def covariance_of(
         pull = np.zeros((len(free), 6))
         pull[:, :4] = prior[free, :4]
         pull -= j.T @ lens
-        own = pull @ problem.known.covariance @ pull.T
-        inner = inner @ (information + own) @ inner
+        # As a square of factors it stays positive, however little the marks tell.
+        factor = inner @ np.hstack([j.T, pull @ _root(problem.known.covariance)])
+        inner = factor @ factor.T
     out = np.zeros((10, 10))
     out[np.ix_(free, free)] = (inner + inner.T) / 2.0
     return out
@@ -86,6 +87,12 @@ def _lens_jacobian(known: KnownIntrinsics, points: Array, genes: Array) -> Array
     out[:, :, 4] = flat * [i.alpha_u, i.alpha_v] * r2[:, None]
     out[:, :, 5] = out[:, :, 4] * r2[:, None]
     return out
+
+
+def _root(covariance: Array) -> Array:
+    """Return a matrix (D, D) whose square is a covariance that need not have full rank."""
+    values, vectors = np.linalg.eigh(np.asarray(covariance, dtype=float))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _inverse(matrix: Array) -> Array:

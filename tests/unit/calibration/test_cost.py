@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from legato.calibration.cost import cost, prepare, residuals, split_alphas
-from legato.calibration.derivatives import jacobian
+from legato.calibration.cost import cost, mark_costs, prepare, residuals, split_alphas
+from legato.calibration.derivatives import jacobian, normal_equations
 from legato.calibration.problem import PAPER_BOUNDS, CalibrationError
 from legato.geometry.transforms import angles_from_rotation
 
@@ -32,11 +32,38 @@ def test_a_population_is_priced_as_its_members_are(scenes: Any) -> None:
     """A batch gives the same costs as one individual at a time, finite or not."""
     model = prepare(scenes.paper("c").problem)
     rng = np.random.default_rng(3)
-    genes = rng.uniform(model.search[0], model.search[1], (50, 11))
+    genes = rng.uniform(model.search[0], model.search[1], (600, 11))
     together = cost(model, genes)
     assert np.isinf(together).any()
     assert np.isfinite(together).any()
     np.testing.assert_allclose(together, [cost(model, g[None])[0] for g in genes], rtol=1e-12)
+    weights = rng.uniform(0.5, 1.0, (600, 7))
+    alone = [cost(model, genes[i : i + 1], weights[i : i + 1])[0] for i in range(600)]
+    np.testing.assert_allclose(cost(model, genes, weights), alone, rtol=1e-12)
+
+
+def test_the_marks_share_the_cost(scenes: Any) -> None:
+    """Each mark's part adds up to the whole; a mark behind the camera has a huge one."""
+    model = prepare(scenes.paper("c").problem)
+    genes = np.random.default_rng(4).uniform(model.search[0], model.search[1], (600, 11))
+    parts, whole = mark_costs(model, genes), cost(model, genes)
+    seen = np.isfinite(whole)
+    np.testing.assert_allclose(parts[seen].sum(axis=1), whole[seen], rtol=1e-12)
+    assert (parts[~seen].max(axis=1) >= 1e12).all()
+
+
+def test_the_normal_equations_carry_the_cost(scenes: Any) -> None:
+    """What the refinement minimises is the cost, prior and left-out marks included."""
+    scene = scenes.random(5, scenes.ten)
+    model = prepare(scene.known(np.diag([4.0, 4.0, 9.0, 9.0, 0.0, 0.0])))
+    genes = np.random.default_rng(5).uniform(model.search[0], model.search[1], (40, 11))
+    genes[:, 1:5] += np.random.default_rng(6).normal(0.0, 3.0, (40, 4))
+    weights = np.ones((40, 10))
+    weights[::2, 3] = 0.0
+    value, hessian, gradient = normal_equations(model, genes, weights)
+    np.testing.assert_allclose(value, cost(model, genes, weights), rtol=1e-9)
+    assert hessian.shape == (40, 10, 10)
+    assert gradient.shape == (40, 10)
 
 
 def test_cost_is_the_weighted_sum_of_squares(scenes: Any, truth: Any) -> None:

@@ -4,9 +4,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from legato.calibration.cost import cost, prepare
 from legato.calibration.derivatives import normal_equations
+from legato.calibration.outcome import agreement
 from legato.calibration.problem import PAPER_BOUNDS, Problem
 from legato.calibration.refine import refine
 from legato.geometry.transforms import Array, angles_from_rotation
@@ -48,6 +50,53 @@ def test_bounded_optima_meet_the_conditions_of_optimality(scenes: Any, truth: An
     assert (scaled[at_low] >= -1e-6).all()
     assert (scaled[at_high] <= 1e-6).all()
     assert np.abs(scaled[~at_low & ~at_high]).max() < 1e-4
+
+
+@pytest.mark.parametrize("seed", [14, 16, 18, 28])
+def test_a_bound_does_not_feign_convergence(scenes: Any, seed: int) -> None:
+    """In a flat valley along a bound all that converge near the best cost share it to 1e-6."""
+    scene = scenes.random(seed, scenes.six_and_one, sigma=0.5)
+    bounds = {**PAPER_BOUNDS, "v0": (scene.intrinsics.v0 + 15.0, 330.0)}
+    model = prepare(replace(scene.problem, bounds=bounds))
+    starts = np.random.default_rng(seed).uniform(model.search[0], model.search[1], (60, 11))
+    result = refine(model, starts)
+    near_best = result.converged & (result.cost <= 1.01 * result.cost.min())
+    assert near_best.sum() >= 10
+    np.testing.assert_allclose(result.cost[near_best], result.cost.min(), rtol=1e-6)
+
+
+def test_the_alphas_are_refined_and_f_is_held(scenes: Any, truth: Any) -> None:
+    """Genes that share their alphas are one start; where s_x is fixed f itself moves."""
+    scene = scenes.paper("a", scenes.ten)
+    genes = np.tile(truth(scene), (2, 1))
+    genes[1, :3] *= [2.0, 0.5, 0.5]
+    model = prepare(scene.problem)
+    result = refine(model, genes)
+    np.testing.assert_allclose(result.genes[0], result.genes[1], rtol=1e-9)
+    assert (result.genes[:, 0] == 1.0).all()
+    pitch = scene.intrinsics.alpha_u / 5.0
+    fixed = {**scene.problem.bounds, "s_x": (pitch, pitch)}
+    held = refine(prepare(replace(scene.problem, bounds=fixed)), genes)
+    np.testing.assert_allclose(held.genes[:, 1], pitch)
+    np.testing.assert_allclose(held.cost, result.cost, rtol=1e-6)
+
+
+def test_what_enough_have_met_is_not_waited_for(scenes: Any, truth: Any) -> None:
+    """Once enough have converged to the least cost the rest is broken off, and said to be."""
+    scene = scenes.paper("a", scenes.ten)
+    model = prepare(scene.problem)
+    far = np.random.default_rng(7).uniform(model.search[0], model.search[1], (30, 11))
+    starts = np.concatenate([near(truth(scene), 10, 6), far])
+    all_of_them, some = refine(model, starts), refine(model, starts, enough=5)
+    assert some.rounds < all_of_them.rounds
+    assert some.unfinished.any()
+    assert not all_of_them.unfinished.any()
+    assert not (some.unfinished & some.converged).any()
+    assert np.count_nonzero(some.at_best() & some.converged) >= 5
+    assert some.cost.min() == pytest.approx(all_of_them.cost.min(), rel=1e-6)
+    nearly = refine(model, starts, enough=5, ended=36)
+    assert nearly.unfinished.sum() <= 4
+    assert agreement(some) == some.at_best()[~some.unfinished].mean()
 
 
 def test_no_step_raises_the_cost(scenes: Any) -> None:
