@@ -15,6 +15,8 @@ def detect(context: Context, image: Path) -> None:
     """Find the leg's marks in IMAGE and print their places in px."""
     from legato.config.build import cell_settings
     from legato.config.load import load
+    from legato.control.advice import advise_marks
+    from legato.control.document import suggestion
     from legato.vision.marks import MarksNotFound
     from legato.vision.pick import find_marks
 
@@ -32,8 +34,12 @@ def detect(context: Context, image: Path) -> None:
         context.end(Exit.FAILED)
     marks = {name: [m.u, m.v] for name, m in picking.marks.items()}
     reasons = dict(picking.missing)
-    out.document({"marks": marks, "missing": list(reasons), "reasons": reasons})
+    advice = advise_marks(picking, settings)
+    told = {"marks": marks, "missing": list(reasons), "reasons": reasons}
+    out.document(told | {"suggest": suggestion(advice)})
     rows = [(name, m.u, m.v, m.sigma) for name, m in picking.marks.items()]
     out.table(("mark", "u px", "v px", "sigma px"), rows)
     for name, reason in reasons.items():
         out.note(f"{name} is missing: {reason}")
+    if advice.why:
+        out.note(f"note: {advice.why}")

@@ -11,7 +11,9 @@ from legato.cli.exits import Exit, Failure
 from legato.cli.picture import read_picks, read_picture
 
 if TYPE_CHECKING:
+    from legato.calibration.problem import CalibrationError
     from legato.control.settings import CellSettings
+    from legato.vision.marks import MarksNotFound, Picking
 
 ENGINES = ("hybrid", "paper", "separable")
 
@@ -32,7 +34,7 @@ def solve(
     from legato.calibration.problem import CalibrationError
     from legato.config.load import load
     from legato.control.document import document
-    from legato.control.perceive import find_leg
+    from legato.control.perceive import pick_marks, solve_marks
     from legato.control.verify import picture_checks
     from legato.vision.marks import MarksNotFound
 
@@ -41,10 +43,12 @@ def solve(
     picture = read_picture(image, loaded.config.camera)
     picked = read_picks(picks, settings.leg.names()) if picks is not None else None
     began = time.perf_counter()
+    seed, picking = settings.calibration.seed, None
     try:
-        found = find_leg(picture, settings, seed=settings.calibration.seed, picks=picked)
+        picking = pick_marks(picture, settings, seed=seed, picks=picked)
+        found = solve_marks(picking, settings, seed=seed)
     except (MarksNotFound, CalibrationError) as error:
-        refuse(context, settings, error.text, error.hint, time.perf_counter() - began)
+        refuse(context, settings, error, picking, time.perf_counter() - began)
     checks = picture_checks(found, settings)
     result = document(found, settings, checks) | {"seconds": time.perf_counter() - began}
     context.output.document(result)
@@ -78,14 +82,30 @@ def chosen(loaded: Any, engine: str | None, marks: str | None) -> "CellSettings"
 
 
 def refuse(
-    context: Context, settings: "CellSettings", text: str, hint: str, seconds: float
+    context: Context,
+    settings: "CellSettings",
+    error: "MarksNotFound | CalibrationError",
+    picking: "Picking | None",
+    seconds: float,
 ) -> NoReturn:
-    """Say why there is no pose at all, and end as refused."""
-    engine = settings.calibration.engine
+    """Say why there is no pose at all and which marks would help, and end as refused."""
+    from legato.control.advice import Advice, advise_marks
+    from legato.control.document import suggestion
+
+    unseen = Advice((), settings.leg.names())
+    advice = advise_marks(picking, settings) if picking is not None else unseen
     context.output.document(
-        {"accepted": False, "reasons": [text], "hint": hint, "engine": engine, "seconds": seconds}
+        {
+            "accepted": False,
+            "reasons": [error.text],
+            "hint": error.hint,
+            "engine": settings.calibration.engine,
+            "suggest": suggestion(advice),
+            "seconds": seconds,
+        }
     )
-    context.output.note(f"not accepted: {text}" + (f"\n  what to do: {hint}" if hint else ""))
+    hint = error.hint or (f"show {' or '.join(advice.add)} too" if advice.add else "")
+    context.output.note(f"not accepted: {error.text}" + (f"\n  what to do: {hint}" if hint else ""))
     context.end(Exit.REFUSED)
 
 
@@ -108,5 +128,7 @@ def show(context: Context, result: dict[str, Any]) -> None:
         f"{sigma['rotation_deg']:.3f} deg and {sigma['translation_mm']:.3f} mm, "
         f"{result['seconds']:.2f} s"
     )
+    if result["suggest"]["why"]:
+        out.note(f"note: {result['suggest']['why']}")
     for warning in result["warnings"]:
         out.note(f"note: {warning}")

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from legato.calibration.problem import GENES
+from legato.control.advice import Advice, advise
 from legato.control.perceive import Calibration
 from legato.control.settings import CellSettings
 from legato.control.verify import Check, picture_checks
@@ -53,6 +54,7 @@ def document(
         "agreement": solution.agreement,
         "held_out": [asdict(h) for h in calibration.held_out],
         "suspects": list(calibration.suspects.names),
+        "suggest": suggestion(advise(calibration, settings)),
         "warnings": _warnings(calibration),
         "trace": {"best": list(solution.trace.best), "mean": list(solution.trace.mean)},
         "generations": solution.generations,
@@ -66,6 +68,11 @@ def document(
             "marks": {n: list(p) for n, p in settings.leg.marks.items()},
         },
     }
+
+
+def suggestion(advice: Advice) -> dict[str, Any]:
+    """Return the document's key `suggest`: marks to use, marks to add, and why."""
+    return {"use": list(advice.use), "add": list(advice.add), "why": advice.why}
 
 
 def _shown(calibration: Calibration, settings: CellSettings) -> list[str]:

@@ -49,13 +49,25 @@ class Calibration:
 
 def find_marks_in(image: Image, settings: CellSettings, *, seed: int) -> Picking:
     """Return the marks of a picture; raises CellFault(marks_not_found)."""
-    from legato.vision.pick import find_marks  # brings OpenCV, which the daemon starts without
-
     try:
-        return find_marks(image, settings.leg, settings.nominal, seed=seed)
+        return pick_marks(image, settings, seed=seed)
     except MarksNotFound as error:
         evidence = {"candidates": error.candidates}
         raise CellFault(Cause.MARKS_NOT_FOUND, error.text, error.hint, evidence) from error
+
+
+def pick_marks(
+    image: Image, settings: CellSettings, *, seed: int, picks: Picks | None = None
+) -> Picking:
+    """Return the marks of a picture, snapped to `picks` where a person gave some.
+
+    Raises MarksNotFound where the picture gives too few.
+    """
+    from legato.vision.pick import find_marks, snap_picks
+
+    if picks is not None:
+        return snap_picks(image, settings.leg, settings.nominal, picks)
+    return find_marks(image, settings.leg, settings.nominal, seed=seed)
 
 
 def find_leg(
@@ -66,14 +78,7 @@ def find_leg(
     Raises MarksNotFound where the picture gives too few marks, CalibrationError where what it
     gives cannot be solved.
     """
-    from legato.vision.pick import find_marks, snap_picks
-
-    leg, nominal = settings.leg, settings.nominal
-    if picks is None:
-        picking = find_marks(image, leg, nominal, seed=seed)
-    else:
-        picking = snap_picks(image, leg, nominal, picks)
-    return solve_marks(picking, settings, seed=seed)
+    return solve_marks(pick_marks(image, settings, seed=seed, picks=picks), settings, seed=seed)
 
 
 def solve_marks(picking: Picking, settings: CellSettings, *, seed: int) -> Calibration:
@@ -82,7 +87,7 @@ def solve_marks(picking: Picking, settings: CellSettings, *, seed: int) -> Calib
     One or two marks that beyond doubt are wrong are left out.
     """
     rng = np.random.default_rng(seed)
-    found = _solved(_problem(picking, settings), settings, rng)
+    found = _solved(problem_of(picking, settings), settings, rng)
     problem, solution = found.problem, found.solution
     world_from_object = settings.world_from_camera @ solution.camera_from_object
     places = np.array(settings.stations)
@@ -130,7 +135,7 @@ def perceive(image: Image, settings: CellSettings, *, seed: int) -> Calibration:
         raise Refused(Cause.CALIBRATION_REJECTED, (str(error),)) from error
 
 
-def _problem(picking: Picking, settings: CellSettings) -> Problem:
+def problem_of(picking: Picking, settings: CellSettings) -> Problem:
     """Return the calibration problem of the marks that are to be used."""
     wanted = settings.calibration.marks or settings.leg.names()
     names = tuple(n for n in wanted if n in picking.marks)

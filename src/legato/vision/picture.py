@@ -4,6 +4,9 @@ The header is read before anything is decoded, so that neither a torn file nor o
 gigapixel costs more than the reading of its head.
 """
 
+import re
+import zlib
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +16,8 @@ Grey = NDArray[np.uint8]
 MOST_PIXELS = 32_000_000
 PNG_HEAD = b"\x89PNG\r\n\x1a\n"
 JPEG_HEAD = b"\xff\xd8\xff"
+BMP_HEAD = b"BM"
+PNM_HEAD = re.compile(rb"P[1-6]\s+(?:#[^\n]*\n\s*)*(\d{1,9})\s+(\d{1,9})\s")
 TELL = "give a PNG, JPEG, BMP, TIFF or PGM picture"
 
 
@@ -32,13 +37,26 @@ def decode(data: bytes) -> Grey:
         _check_png(data)
     elif data.startswith(JPEG_HEAD):
         _check_jpeg(data)
-    try:
-        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error as error:
-        raise PictureError(f"the picture cannot be decoded ({error.err}); {TELL}") from error
+    elif data.startswith(BMP_HEAD):
+        _check_bmp(data)
+    elif pnm := PNM_HEAD.match(data):
+        _check_size(int(pnm[1]), int(pnm[2]))
+    image = _decoded(data)
     if image is None:
         raise PictureError(f"{len(data)} bytes are no picture or a damaged one; {TELL}")
     return grey(image)
+
+
+def _decoded(data: bytes) -> NDArray[np.generic] | None:
+    """Return what OpenCV makes of the bytes; what it would print beside is said by the error."""
+    said = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        return cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error as error:
+        raise PictureError(f"the picture cannot be decoded ({error.err}); {TELL}") from error
+    finally:
+        cv2.utils.logging.setLogLevel(said)
 
 
 def encode_png(image: NDArray[np.uint8]) -> bytes:
@@ -92,10 +110,30 @@ def _check_size(width: int, height: int) -> None:
 
 
 def _check_png(data: bytes) -> None:
-    """Refuse a PNG that is cut off or too large, from its first and last chunk."""
-    if len(data) < 33 or b"IEND" not in data[33:]:
-        raise PictureError(f"the PNG is cut off after {len(data)} bytes; copy it again")
-    _check_size(int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big"))
+    """Refuse a PNG that is cut off, damaged or too large, chunk by chunk with their checksums."""
+    at, last = len(PNG_HEAD), b""
+    while last != b"IEND":
+        length = int.from_bytes(data[at : at + 4], "big")
+        end = at + 12 + length
+        if end > len(data):
+            raise PictureError(f"the PNG is cut off after {len(data)} bytes; copy it again")
+        last = data[at + 4 : at + 8]
+        if zlib.crc32(data[at + 4 : end - 4]) != int.from_bytes(data[end - 4 : end], "big"):
+            raise PictureError(f"the PNG is damaged at byte {at}; copy it again")
+        if last == b"IHDR":
+            _check_size(
+                int.from_bytes(data[at + 8 : at + 12], "big"),
+                int.from_bytes(data[at + 12 : at + 16], "big"),
+            )
+        at = end
+
+
+def _check_bmp(data: bytes) -> None:
+    """Refuse a BMP that is cut off or too large."""
+    width, height = (int.from_bytes(data[i : i + 4], "little", signed=True) for i in (18, 22))
+    if len(data) < int.from_bytes(data[2:6], "little"):
+        raise PictureError(f"the BMP is cut off after {len(data)} bytes; copy it again")
+    _check_size(width, abs(height))
 
 
 def _check_jpeg(data: bytes) -> None:
