@@ -3,7 +3,7 @@
 import importlib
 import sys
 
-NAMES = ("calibration", "paper", "demo", "line", "daemon", "passes")
+NAMES = ("calibration", "paper", "demo", "line", "daemon", "passes", "stops")
 
 
 def main(names: list[str]) -> int:

@@ -48,5 +48,6 @@ def keep(name: str, rows: Iterable[Row], **more: object) -> Path:
         "rows": [asdict(r) | {"holds": r.holds} for r in rows],
         **more,
     }
-    path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    text = json.dumps(document, indent=1, default=lambda number: number.item())  # numpy's own
+    path.write_text(text + "\n", encoding="utf-8")
     return path
