@@ -3,7 +3,9 @@
 import importlib
 import sys
 
-NAMES = ("calibration", "paper", "demo", "line", "daemon", "passes", "stops")
+NAMES = (
+    "calibration", "paper", "pictures", "adversary", "demo", "line", "daemon", "passes", "stops",
+)  # fmt: skip
 
 
 def main(names: list[str]) -> int:

@@ -1,0 +1,1 @@
+"""Scenes, spoilt pictures and the whole chain, for the benches of vision."""
