@@ -58,7 +58,9 @@ def expose(sharp: Sharp, spoil: Spoil, rng: np.random.Generator) -> Image:
         picture *= (1.0 + spoil.slant[0] * run / (w / 2)).clip(0.05).astype(np.float32)
     for glare in spoil.glares:
         away = np.hypot(u - glare.at[0], v - glare.at[1]) / glare.radius
-        picture += (glare.strength / (1.0 + np.exp(6.0 * (away - 1.0)))).astype(np.float32)
+        picture += (glare.strength / (1.0 + np.exp(np.minimum(6.0 * (away - 1.0), 40.0)))).astype(
+            np.float32
+        )
     for cover in spoil.covers:
         _lay(picture, cover)
     picture = _soft(cv2.GaussianBlur(picture, (0, 0), spoil.blur, borderType=EDGE))
