@@ -23,7 +23,7 @@ SIGMA = 0.25
 ONE, TWO = 0.6827, 0.9545
 POINTS = 0.03
 MISPRINTS = 30
-WRONG_SCENES = 100
+WRONG_SCENES = 80
 MISPRINTED_Y = -21.6727
 # The camera's own error in "uncertain": alpha 1 px, centre 1.5 px, correlated as a bundle has it.
 LENS = np.diag([1.0, 1.0, 2.25, 2.25, 0.0, 0.0])

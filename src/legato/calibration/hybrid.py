@@ -54,7 +54,7 @@ def genes_to_search(problem: Problem) -> Searched:
         whole[:, columns] = genes
         return whole
 
-    return Searched(columns, fill, shorter=1 if free else 2)
+    return Searched(columns, fill, shorter=1 if free else 3)
 
 
 def solve_searched(
