@@ -1,6 +1,6 @@
 """A case: two pictures, what the cell believes, and what is true."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ class Case:
     settings: CellSettings
     truth: Truth | None
     other: Truth | None = None  # a leg that may be found as well
+    picks: Mapping[str, tuple[float, float]] | None = None  # a person's
 
 
 Draw = Callable[[np.random.Generator], Case]

@@ -6,13 +6,16 @@ from typing import Any
 import numpy as np
 
 from bench.vision.scenes import Truth
+from legato.calibration.problem import CalibrationError
 from legato.control import effects as do
 from legato.control.jobs import procedure
 from legato.control.memory import Memory
-from legato.control.perceive import Calibration, find_marks_in, perceive
+from legato.control.perceive import Calibration, Picks, find_leg, find_marks_in, perceive
 from legato.control.settings import CellSettings
 from legato.geometry.transforms import angle_between
 from legato.hal.camera import Frame, Image
+from legato.hal.faults import Cause
+from legato.vision.marks import MarksNotFound
 
 
 @dataclass(frozen=True)
@@ -33,8 +36,13 @@ class Verdict:
         return float(np.degrees(turn)), float(off.max())
 
 
-def verify(settings: CellSettings, first: Image, second: Image) -> Verdict:
-    """Run capture, calibrate and verify as the daemon would, with these two pictures."""
+def verify(
+    settings: CellSettings, first: Image, second: Image, picks: Picks | None = None
+) -> Verdict:
+    """Run capture, calibrate and verify as the daemon would, with these two pictures.
+
+    Where a person gave `picks` they name the first picture's marks, as in `legato solve --picks`.
+    """
     seed, memory = settings.calibration.seed, Memory()
     solved: list[Calibration] = []
     documents: list[Any] = []
@@ -44,7 +52,7 @@ def verify(settings: CellSettings, first: Image, second: Image) -> Verdict:
             case do.Grab():
                 return Frame(image, 0.0, 1, "bench")
             case do.Solve():
-                solved.append(perceive(effect.frame.image, settings, seed=seed))
+                solved.append(_solved(effect.frame.image, settings, seed, picks))
                 return solved[-1]
             case do.Find():
                 return find_marks_in(effect.frame.image, settings, seed=seed)
@@ -62,6 +70,15 @@ def verify(settings: CellSettings, first: Image, second: Image) -> Verdict:
         reasons = (fault.text,)
     checks = tuple(documents[-1]["checks"]) if documents else ()
     return Verdict(not reasons, reasons, solved[-1] if solved else None, checks)
+
+
+def _solved(image: Image, settings: CellSettings, seed: int, picks: Picks | None) -> Calibration:
+    if picks is None:
+        return perceive(image, settings, seed=seed)
+    try:
+        return find_leg(image, settings, seed=seed, picks=picks)
+    except (CalibrationError, MarksNotFound) as error:
+        raise do.Refused(Cause.CALIBRATION_REJECTED, (str(error),)) from error
 
 
 def _perform(work: Any, image: Image, result: Any) -> None:

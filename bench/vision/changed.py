@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from bench.vision.cases import Case, shown, usual
-from bench.vision.clutter import covers_over
+from bench.vision.clutter import covers_over, mark_pixels
 from bench.vision.scenes import (
     Sharp,
     Truth,
@@ -52,6 +52,22 @@ def free_camera(rng: np.random.Generator) -> Case:
     truth = drawn(rng)
     spoil = replace(usual(rng), covers=covers_over(truth, rng, int(rng.integers(0, 4)), 0))
     return shown(truth, spoil, rng, settings("free"))
+
+
+def swapped_picks(rng: np.random.Generator) -> Case:
+    """Draw a person's picks of six to ten marks, two to four names in each other's places."""
+    case = shown(drawn(rng), usual(rng), rng)
+    assert case.truth is not None
+    pixels = mark_pixels(case.truth)
+    names = [str(n) for n in rng.permutation(list(pixels))[: int(rng.integers(6, 11))]]
+    count = min(int(rng.integers(2, 5)), len(names))
+    named = dict(zip(names, names, strict=True))
+    named |= dict(zip(names[:count], [*names[1:count], names[0]], strict=True))
+    picks = {}
+    for name, at in named.items():
+        u, v = pixels[at] + rng.uniform(-6.0, 6.0, 2)
+        picks[name] = (float(u), float(v))
+    return replace(case, picks=picks)
 
 
 def moved_between(rng: np.random.Generator) -> Case:

@@ -35,6 +35,7 @@ KINDS: Mapping[str, tuple[Draw, int]] = {
     "wrong intrinsics, hidden marks": (changed.wrong_camera_hidden, 60),
     "wrong intrinsics, spoilt picture": (changed.wrong_camera_spoilt, 60),
     "free intrinsics": (changed.free_camera, 60),
+    "swapped picks": (changed.swapped_picks, 100),
     "leg moved between": (changed.moved_between, 160),
     "camera bumped between": (changed.camera_bumped_between, 60),
 }

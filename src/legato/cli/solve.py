@@ -33,9 +33,9 @@ def solve(
     """Find the leg in IMAGE and print its pose; exit 3 where it may not be trusted."""
     from legato.calibration.problem import CalibrationError
     from legato.config.load import load
+    from legato.control.checks import picture_checks
     from legato.control.document import document
     from legato.control.perceive import pick_marks, solve_marks
-    from legato.control.verify import picture_checks
     from legato.vision.marks import MarksNotFound
 
     loaded = load(context.config)

@@ -110,6 +110,7 @@ def _ranges(config: Config) -> Iterator[tuple[str, tuple[float, float]]]:
     """Yield every key that holds a low and a high value."""
     for name in config.calibration.bounds.__struct_fields__:
         yield f"calibration.bounds.{name}", getattr(config.calibration.bounds, name)
+    yield "calibration.leg_rests_mm", config.calibration.leg_rests_mm
     for name in ("base_deg", "shoulder_deg", "elbow_deg", "wrist_deg", "roll_deg"):
         yield f"robot.{name}", getattr(config.robot, name)
     for name in ("x_mm", "y_mm", "z_mm"):

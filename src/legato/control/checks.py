@@ -171,14 +171,12 @@ def _camera(calibration: Calibration) -> Check | None:
     )  # fmt: skip
 
 
-def _mark_size(calibration: Calibration, settings: CellSettings) -> Check | None:
+def _mark_size(calibration: Calibration, settings: CellSettings) -> Check:
     """Return whether the marks are as large as they should be at their distance."""
     most = settings.calibration.max_mark_size_percent
-    if most is None:
-        return None
     names = calibration.problem.names
     size, sigma = mark_size({n: calibration.picking.marks[n] for n in names})
-    off, known = 100.0 * abs(size - 1.0), 100.0 * sigma
+    off, known = 100.0 * abs(size - 1.0), 100.0 * min(sigma, 1.0)
     return limit(
         "mark size", off + known, most, "%",
         f"the marks are {100.0 * (size - 1.0):+.2f} % of their size off, known to {known:.2f} %",

@@ -8,9 +8,9 @@ import numpy as np
 
 from legato.calibration.problem import GENES
 from legato.control.advice import Advice, advise
+from legato.control.checks import Check, picture_checks
 from legato.control.perceive import Calibration
 from legato.control.settings import CellSettings
-from legato.control.verify import Check, picture_checks
 from legato.geometry.projection import project
 
 NOT_SEPARABLE = "f, s_x and s_y are not separately observable: only alpha_u and alpha_v are"

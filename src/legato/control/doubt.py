@@ -75,7 +75,7 @@ def camera_doubt(calibration: Calibration) -> CameraDoubt | None:
     before, _ = misfit(prepare(problem), genes)
     after, _ = misfit(model, better.genes[0])
     apart = _apart(pose_of(genes), pose_of(better.genes[0]), problem.stations)
-    alpha = float(np.sqrt(np.prod(better.genes[0, 1:3] / [i.alpha_u, i.alpha_v])))
+    alpha = float(np.sqrt(np.abs(np.prod(better.genes[0, 1:3] / [i.alpha_u, i.alpha_v]))))
     return CameraDoubt(before - after, noise_limit(4), float(apart.max(initial=0.0)), alpha)
 
 

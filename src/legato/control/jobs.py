@@ -6,6 +6,7 @@ A job returns its outcome, `done` or `stopped`; it raises Refused or CellFault o
 from collections.abc import Generator
 from typing import Any
 
+from legato.control.checks import Check, picture_checks, second_picture_check
 from legato.control.document import document
 from legato.control.effects import (
     CellFault,
@@ -29,7 +30,7 @@ from legato.control.settings import CellSettings
 from legato.control.states import CALIBRATE, CAPTURE, MOVE_HOME, STOPPING, VERIFY
 from legato.control.strokes import Job
 from legato.control.table import PRECONDITION, Refusal
-from legato.control.verify import Check, cell_checks, picture_checks, second_picture_check
+from legato.control.verify import cell_checks
 from legato.hal.faults import Cause, DeviceError
 
 CALIBRATION_FILE = "calibration.json"

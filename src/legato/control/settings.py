@@ -67,11 +67,11 @@ class CalibrationSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """How far the second picture's own pose may put a station from where the first puts it."""
     min_agreement: Annotated[float, Meta(ge=0, le=1)] = 0.1
     """Share of the searches that must end in the pose that is taken."""
-    max_mark_size_percent: Positive | None = 0.3
+    max_mark_size_percent: Positive = 0.3
     """How far the marks' mean size may be off: 0.4 % stands for 1 mm at the farthest station. A leg
-    of another size with marks of the right one is told by this alone."""
-    leg_rests_mm: Range | None = (-4.0, 30.0)
-    """How high over the table the leg's lowest point may lie; none does not ask."""
+    of another size with marks of the right one is told by this alone; 1000 never refuses."""
+    leg_rests_mm: Range = (-4.0, 30.0)
+    """How high over the table the leg's lowest point may lie; -1000 to 1000 never refuses."""
     allow_on_bound: bool = False
     fresh_s: Annotated[float, Meta(gt=0, le=604_800)] = 3600.0
     """A verified calibration older than this is not used for a massage."""

@@ -5,25 +5,19 @@ What pictures can answer stands in control.checks; here is what the leg's place 
 
 import numpy as np
 
-from legato.control.checks import Check, picture_checks, second_picture_check
+from legato.control.checks import Check
 from legato.control.perceive import Calibration
 from legato.control.rehearsal import dry_run
 from legato.control.settings import CellSettings
 
-__all__ = [
-    "Check", "cell_checks", "dry_run", "lowest_point", "picture_checks",
-    "second_picture_check",
-]  # fmt: skip
-
 
 def cell_checks(calibration: Calibration, settings: CellSettings) -> list[Check]:
     """Return the tests of the leg's place in the cell: table, workspace, reach, clearance."""
-    checks = [
+    return [
         _rests(calibration, settings),
         _workspace(calibration, settings),
         _reachable(calibration, settings),
     ]
-    return [c for c in checks if c is not None]
 
 
 def lowest_point(calibration: Calibration, settings: CellSettings) -> float:
@@ -35,10 +29,8 @@ def lowest_point(calibration: Calibration, settings: CellSettings) -> float:
     return float(low - settings.workspace.table_z)
 
 
-def _rests(calibration: Calibration, settings: CellSettings) -> Check | None:
-    """Return whether the leg lies on the table; None where it need not."""
-    if settings.calibration.leg_rests_mm is None:
-        return None
+def _rests(calibration: Calibration, settings: CellSettings) -> Check:
+    """Return whether the leg lies on the table, or as high over it as it may."""
     low, high = settings.calibration.leg_rests_mm
     height = lowest_point(calibration, settings)
     text = (

@@ -32,6 +32,7 @@ LEAST_MARKS = 5  # named marks; fewer agree with a wrong pose too easily
 ENOUGH_MARKS = 7  # so many never agree by chance: the search ends
 ROUNDS = 16  # triples of marks tried
 MOST_CONFIRMED = 6  # labellings of few marks that are held against the picture
+CROWDED_ROUNDS = 10  # the same where places abound: each costs more
 MOST_ROUNDS, BUDGET = 64, 16000  # more of them where candidates are few: their product
 STRONG = 0.3  # of the fourth strongest contrast
 RADII = (30.0, 14.0, 7.0, 5.0)  # px at width 768 of the successive assignments
@@ -218,6 +219,8 @@ def _search(
 
 def _affordable(n: int) -> int:
     """Return how many triples of marks are worth trying with n candidates."""
+    if crowded(n):
+        return CROWDED_ROUNDS
     return min(MOST_ROUNDS, max(ROUNDS, BUDGET // (n * (n - 1) * (n - 2))))
 
 

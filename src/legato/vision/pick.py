@@ -21,7 +21,7 @@ from legato.vision.view import View, fit_view
 
 LEAST_FOUND = 6  # measured marks
 LEAST_SECOND = 5  # marks of a second leg
-SECOND_ROUNDS = 6  # triples of marks tried for it
+SECOND_ROUNDS = 3  # triples of marks tried for it
 OTHER = 5.0  # px from every mark of the first leg
 LARGEST_MISFIT = 0.8  # mm across the line of sight: marks are pasted by hand
 LEAST_LIMIT = 1.2  # px: what a view may be wrong by, however far the leg

@@ -10,17 +10,12 @@ import pytest
 
 from legato.calibration.problem import CalibrationError, KnownIntrinsics
 from legato.control.advice import advise, advise_marks
+from legato.control.checks import Check, picture_checks, second_picture_check
 from legato.control.document import document
 from legato.control.doubt import mark_size
 from legato.control.perceive import Calibration, solve_marks
 from legato.control.settings import CalibrationSettings, CellSettings
-from legato.control.verify import (
-    Check,
-    cell_checks,
-    lowest_point,
-    picture_checks,
-    second_picture_check,
-)
+from legato.control.verify import cell_checks, lowest_point
 from legato.drivers.sim.settings import SimSettings
 from legato.drivers.sim.world import drawn_pose
 from legato.geometry.projection import Intrinsics
@@ -154,7 +149,7 @@ def test_marks_of_unknown_size_are_refused_unless_not_asked_for() -> None:
     marks = {n: FoundMark(m.u, m.v, m.sigma) for n, m in seen(settings, pose).marks.items()}
     calibration = solved(settings, Picking(marks))
     assert failed(picture_checks(calibration, settings)) == {"mark size"}
-    without = replace(settings, calibration=table(max_mark_size_percent=None))
+    without = replace(settings, calibration=table(max_mark_size_percent=1000.0))
     assert failed(picture_checks(calibration, without)) == set()
 
 
@@ -209,7 +204,7 @@ def test_a_leg_that_cannot_lie_there_is_refused(height: float) -> None:
     pose[2, 3] += height
     calibration = solved(settings, seen(settings, pose))
     assert "table" in failed(cell_checks(calibration, settings))
-    lax = replace(settings, calibration=table(leg_rests_mm=None))
+    lax = replace(settings, calibration=table(leg_rests_mm=(-1000.0, 1000.0)))
     assert "table" not in failed(cell_checks(calibration, lax))
 
 

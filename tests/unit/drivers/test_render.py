@@ -136,3 +136,20 @@ def test_marks_are_pasted_within_the_hands_turn() -> None:
     assert drawn[0] != drawn[2]
     assert all(abs(m.turn) <= np.radians(7.0) for m in drawn[0].values())
     assert {m.parity for d in drawn for m in d.values()} == {-1, 1}
+
+
+def test_a_leg_is_laid_over_what_lies_behind(still: Renderer) -> None:
+    """Over another picture the leg is the same, and the rest is that picture; it is not changed."""
+    pose = _camera_from_object()
+    own = still.sharp(pose, CAMERA_FROM_WORLD)
+    behind = np.full_like(own, 0.123)
+    laid = still.sharp(pose, CAMERA_FROM_WORLD, behind)
+    assert (behind == np.float32(0.123)).all()
+    around = np.isclose(laid, 0.123, atol=1e-6)
+    scenery = still.scenery(pose, CAMERA_FROM_WORLD)
+    assert 0.1 < (~around).mean() < 0.9
+    # Along the outline a pixel shows a part of both.
+    inner = cv2.erode((~around).astype(np.uint8), np.ones((5, 5))) > 0
+    assert np.allclose(laid[inner], own[inner], atol=1e-6)
+    outer = cv2.erode(around.astype(np.uint8), np.ones((5, 5))) > 0
+    assert np.allclose(own[outer], scenery[outer], atol=1e-6)

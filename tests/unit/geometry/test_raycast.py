@@ -7,7 +7,16 @@ from hypothesis import strategies as st
 
 from legato.geometry.leg import Leg
 from legato.geometry.projection import Intrinsics, project, undistort
-from legato.geometry.raycast import BIG_FACE, MISS, SIDE, SMALL_FACE, cast, facing, object_rays
+from legato.geometry.raycast import (
+    BIG_FACE,
+    MISS,
+    SIDE,
+    SMALL_FACE,
+    cast,
+    facing,
+    object_rays,
+    points_on,
+)
 from legato.geometry.transforms import invert, look_at
 
 LEG = Leg()
@@ -89,3 +98,18 @@ def test_facing_agrees_with_casting() -> None:
             if abs(cosine) > 0.02:
                 hits = cast(LEG, eye, np.asarray(centre) - eye)
                 assert (abs(float(hits.distance) - 1.0) < 1e-4) == (cosine > 0.0)
+
+
+def test_points_on_a_part_are_those_that_rays_meet_first() -> None:
+    """On a part that faces the rays' origin, asking for it alone gives what casting gives."""
+    rng = np.random.default_rng(5)
+    origin = np.array([-60.0, -120.0, 40.0])
+    targets = rng.uniform([0.0, -30.0, -30.0], [194.0, 30.0, 30.0], (400, 3))
+    hits = cast(LEG, origin, targets - origin)
+    for part in (SIDE, BIG_FACE):
+        own = hits.part == part
+        assert own.sum() > 10
+        points = points_on(LEG, part, origin, targets - origin)
+        assert np.allclose(points[own], hits.points[own], atol=1e-9)
+    miss = points_on(LEG, SIDE, origin, np.array([[0.0, -1.0, 0.0]]))
+    assert np.isnan(miss).all()

@@ -1,5 +1,6 @@
 """Picture files in, grey arrays out."""
 
+import io
 import zlib
 
 import cv2
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 from legato.vision.picture import PictureError, decode, encode_png, grey
 
@@ -115,3 +117,63 @@ def test_damaged_files_cause_no_other_error(at: int, value: int, kind: str) -> N
     except PictureError:
         return
     assert image.ndim == 2
+
+
+@pytest.mark.parametrize(
+    ("mode", "name"),
+    [("LA", "a.png"), ("P", "a.png"), ("P", "a.gif"), ("CMYK", "a.jpg"), ("L", "a.tiff")],
+)
+def test_what_other_programs_write_is_read(mode: str, name: str) -> None:
+    """Grey with alpha, palettes, printers' colours and compressed TIFF give their grey levels."""
+    stream = io.BytesIO()
+    picture = Image.fromarray(RAMP).convert(mode)
+    if mode == "CMYK":
+        picture.save(stream, "jpeg", quality=100)
+    elif name == "a.tiff":
+        picture.save(stream, "tiff", compression="tiff_lzw")
+    else:
+        picture.save(stream, name[2:])
+    assert np.abs(decode(stream.getvalue()).astype(int) - RAMP).max() <= 4
+
+
+def test_a_note_of_orientation_is_ignored() -> None:
+    """The intrinsics belong to the sensor: a picture is never turned."""
+    stream, note = io.BytesIO(), Image.Exif()
+    note[274] = 6
+    Image.fromarray(RAMP).save(stream, "jpeg", exif=note)
+    assert decode(stream.getvalue()).shape == RAMP.shape
+
+
+def test_colour_of_sixteen_bits_is_scaled() -> None:
+    """Colour and alpha in 16 bits give the 8-bit grey levels."""
+    wide = RAMP.astype(np.uint16) * 257
+    for planes in ([wide] * 3, [*[wide] * 3, np.zeros_like(wide)]):
+        assert np.abs(decode(_file(".png", cv2.merge(planes))).astype(int) - RAMP).max() <= 1
+
+
+def test_a_damaged_png_is_told_by_its_checksums() -> None:
+    """A changed byte in the pixels is refused, not shown as stripes."""
+    whole = bytearray(_file(".png", np.random.default_rng(0).integers(0, 256, (64, 64), np.uint8)))
+    whole[len(whole) // 2] ^= 0x55
+    with pytest.raises(PictureError, match="damaged"):
+        decode(bytes(whole))
+
+
+def test_heads_that_claim_too_much_are_refused() -> None:
+    """BMP and PGM of a gigapixel are refused by their heads, a BMP cut off by its length."""
+    bmp = bytearray(_file(".bmp", RAMP))
+    with pytest.raises(PictureError, match="cut off"):
+        decode(bytes(bmp[:900]))
+    bmp[18:26] = (40000).to_bytes(4, "little") * 2
+    for claim in (bytes(bmp), b"P5\n# note\n40000 40000\n255\n" + bytes(99)):
+        with pytest.raises(PictureError, match="too large"):
+            decode(claim)
+
+
+def test_what_cannot_be_decoded_says_nothing_beside(capfd: pytest.CaptureFixture[str]) -> None:
+    """The error is the one line that is told: OpenCV prints none of its own."""
+    for kind in (".tiff", ".pgm"):
+        with pytest.raises(PictureError):
+            decode(_file(kind, RAMP)[:200])
+    said = capfd.readouterr()
+    assert (said.out, said.err) == ("", "")
