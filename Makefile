@@ -6,7 +6,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: env demo test lint types contracts unit bench lock clean
+.PHONY: env demo test lint types contracts unit browser bench web lock clean docs
 
 env: .venv/.ready
 
@@ -24,8 +24,8 @@ demo: env
 test: env lint types contracts unit
 
 lint: env
-	$(BIN)/ruff check src tests bench
-	$(BIN)/ruff format --check src tests bench
+	$(BIN)/ruff check src tests bench docs
+	$(BIN)/ruff format --check src tests bench docs
 
 types: env
 	$(BIN)/mypy
@@ -33,11 +33,28 @@ types: env
 contracts: env
 	$(BIN)/lint-imports --no-cache
 
-unit: env
+unit: env browser
 	$(BIN)/pytest -n 2 --dist worksteal
 
 bench: env
 	$(BIN)/python -m bench
+
+# The documentation as a site, build/site/index.html; any warning is an error.
+docs: env
+	$(BIN)/python -m sphinx -E -W --keep-going -q -b html -d build/doctrees docs build/site
+	@echo build/site/index.html
+
+# The page's tests drive a browser: the machine's, Debian's where we may install it, else the one
+# that playwright brings.
+browser: env
+	@command -v chromium || command -v chromium-browser || command -v google-chrome \
+		|| { [ "$$(id -u)" = 0 ] && command -v apt-get && apt-get update -qq \
+			&& apt-get install -y -qq --no-install-recommends chromium; } \
+		|| $(BIN)/playwright install chromium-headless-shell
+
+# What the page takes from npm, vendored anew with licences and hashes; only this needs Node.
+web:
+	cd web && npm ci --ignore-scripts --no-audit --no-fund && npm run vendor
 
 # Versions anew, with hashes and without an index's address.
 lock:
