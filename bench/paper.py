@@ -6,6 +6,7 @@ pictures. `python -m bench paper` writes docs/paper/: the table, the curves, the
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -218,16 +219,24 @@ def pictures(poses: list[Pose], path: Path) -> None:
         axes.imshow(pose.picture, cmap="gray", vmin=0, vmax=255)
         for name, mark in pose.picking.marks.items():
             axes.plot(mark.u, mark.v, "+", color="#d62728")
-            axes.annotate(name, (mark.u + 8, mark.v - 8), color="#ffd23f", fontsize=8)
+            right = mark.u + 60 < pose.picture.shape[1]
+            place, side = (mark.u + (8 if right else -8), mark.v - 8), "left" if right else "right"
+            axes.annotate(name, place, ha=side, color="#ffd23f", fontsize=8)
         axes.set_title(f"pose {pose.name}")
         axes.set_axis_off()
     figure.savefig(path)
 
 
+def _solved(pose: Pose) -> bool:
+    return pose.results[0].solution is not None
+
+
 def curves(poses: list[Pose], path: Path) -> None:
     """Write best and mean cost by generation of the searches with all eleven genes."""
     figure = Figure(figsize=(10.0, 7.0), layout="constrained")
-    for pose, axes in zip(poses, figure.subplots(2, 2).flat, strict=True):
+    panels = list(figure.subplots(2, 2).flat)
+    lines: dict[str, Any] = {}
+    for pose, axes in zip(poses, panels, strict=True):
         axes.set_title(f"pose {pose.name}")
         for result, colour in zip(pose.results[:2], ("#1f5fa8", "#c2571a"), strict=True):
             if result.solution is None:
@@ -242,6 +251,9 @@ def curves(poses: list[Pose], path: Path) -> None:
                 end = max(result.solution.cost, 1e-6)
                 axes.plot(len(trace.best) - 1, end, "v", color=colour, label="hybrid, refined")
         axes.set(xlabel="generation", ylabel="cost (sum of squares, px²)")
-        if pose.results[0].solution is not None:
-            axes.legend(fontsize=8)
+        handles, labels = axes.get_legend_handles_labels()
+        lines |= dict(zip(labels, handles, strict=True))
+    # One legend for all, in the panel of the pose that has no curve.
+    empty = next((a for p, a in zip(poses, panels, strict=True) if not _solved(p)), panels[0])
+    empty.legend(lines.values(), lines.keys(), fontsize=8, loc="upper center")
     figure.savefig(path)

@@ -260,6 +260,10 @@ def _write(
         f"{POSES} poses over the workspace, then {SPOILT} a way of spoiling the picture, each with",
         f"at least {FEWEST} sound marks left in sight. Made by `python -m bench pictures`.",
         "",
+        "Free intrinsics: alpha_u, alpha_v, u0, v0 are found from the one picture. k1 and k2 are",
+        "not: ten marks cannot tell them. They are those of the camera's intrinsics file, or zero",
+        "where there is none; here the file has them, off by what its covariance says.",
+        "",
         "| mark | found | rms px | worst px |",
         "|---|---|---|---|",
         *(

@@ -1,4 +1,4 @@
-"""Calibration without pictures: optima, bounds, times, trust, intrinsics; about five minutes."""
+"""Calibration without pictures: optima, bounds, times, trust, intrinsics; about fifteen minutes."""
 
 import math
 import os

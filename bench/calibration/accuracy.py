@@ -1,8 +1,8 @@
 """Optimum found, and error against the Cramer-Rao bound at the truth, for every way in every cell.
 
 A cell is a set of marks, a noise, and intrinsics known or free. With 200 scenes an rms has a
-sampling error of 4 to 5 %: it is given, and beside it the excess over the bound with the error of
-the best linear estimator on the very same noise taken out, which is ten times sharper.
+sampling error of 4 to 5 %: it is given, beside it that of 2,000 scenes, and the excess over the
+bound with the error of the best linear estimator on the very same noise taken out.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ from legato.geometry.transforms import Array
 
 Table = Mapping[str, Mapping[str, Any]]
 
-SCENES = 200
+SCENES, MANY = 200, 2000
 SLOW_SCENES = {"paper": 1, "scipy DE + LM": 3, "scipy DE, 100 generations, + LM": 4}
 MOST_OVER_BOUND = 1.08
 # As near as costs of one optimum come out by different programs.
@@ -76,9 +76,30 @@ def figures(cell: Cell) -> dict[str, Any]:
         kept = [k for k, a in enumerate(found) if a is not None and _inside(cell, a)]
         reference[kept] = np.minimum(reference[kept], costs)
     bound, linear = bounds(scenes, cell.known)
-    return {
+    told = {
         name: _summary(scenes, found, reference, bound, linear) for name, found in answers.items()
     }
+    if cell.known:
+        for name, ratios in many(cell).items():
+            for what, ratio in ratios.items():
+                told[name][what]["many"] = ratio
+    return told
+
+
+def many(cell: Cell) -> dict[str, dict[str, float]]:
+    """Return our engines' rms over the bound in so many scenes that chance hardly counts."""
+    scenes = [cell.scene(k) for k in range(MANY)]
+    floor = bounds(scenes, cell.known)[0].mean(axis=0)
+    found = {}
+    for name in OURS:
+        answers = [WAYS[name](s, cell.known, k) for k, s in enumerate(scenes)]
+        square = [
+            (np.inf, np.inf) if a is None else np.square(s.errors(a.pose))
+            for s, a in zip(scenes, answers, strict=True)
+        ]
+        rotation, translation = np.sqrt(np.mean(square, axis=0) / floor)
+        found[name] = {"rotation_deg": float(rotation), "translation_mm": float(translation)}
+    return found
 
 
 def _inside(cell: Cell, answer: Answer) -> bool:
@@ -187,6 +208,7 @@ def _over_bound(table: Table, name: str, what: str) -> list[Row]:
     """
     known = {c.name: table[c.name][name][what] for c in CELLS if c.known}
     raw = max(known, key=lambda c: known[c]["over_bound"])
+    most = max(known, key=lambda c: known[c]["many"])
     sharp = max(known, key=lambda c: known[c]["sharp"])
     title = f"calibration: {name}, known, {what.split('_')[0]} over bound"
     peer = table[raw]["SQPNP + LM"][what]["over_bound"]
@@ -195,6 +217,10 @@ def _over_bound(table: Table, name: str, what: str) -> list[Row]:
         Row(
             f"{title}, worst cell as drawn", known[raw]["over_bound"], "x",
             note=f"+-{known[raw]['standard_error']:.3f} ({raw}; SQPNP + LM there {peer:.3f})",
+        ),
+        Row(
+            f"{title}, worst cell of {MANY} scenes", known[most]["many"], "x", MOST_OVER_BOUND,
+            note=most,
         ),
         Row(
             f"{title}, worst cell, chance taken out", f["sharp"], "x", MOST_OVER_BOUND,

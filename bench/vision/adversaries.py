@@ -107,8 +107,20 @@ def scaled_leg(rng: np.random.Generator) -> Case:
 
 def scaled_with_marks(rng: np.random.Generator) -> Case:
     """Draw a leg of 0.9 to 1.1 times the size, its marks too: the same picture from farther."""
-    by = rng.uniform(0.9, 1.1)
-    return shown(drawn(rng, 1.0, scaled(by, 8.0 * by)), usual(rng), rng)
+    return _rescaled(rng, rng.uniform(0.9, 1.1))
+
+
+def scaled_far_with_marks(rng: np.random.Generator) -> Case:
+    """Draw a leg of 0.6 to 0.85 or 1.25 to 1.6 times the size, its marks too, on the table."""
+    return _rescaled(rng, rng.uniform(*((0.6, 0.85), (1.25, 1.6))[int(rng.integers(2))]))
+
+
+def _rescaled(rng: np.random.Generator, by: float) -> Case:
+    """Return a leg so many times as large with all that is on it; it rests where the leg would."""
+    truth = drawn(rng, 1.0, scaled(by, 8.0 * by))
+    place = truth.world_from_object.copy()
+    place[2, 3] += LEG.big_radius * (by - 1.0)
+    return shown(replace(truth, world_from_object=place), usual(rng), rng)
 
 
 def mirrored(rng: np.random.Generator) -> Case:

@@ -27,6 +27,11 @@ def wrong_camera(rng: np.random.Generator) -> Case:
     return shown(drawn(rng), usual(rng), rng, _believing(rng))
 
 
+def wrong_camera_five(rng: np.random.Generator) -> Case:
+    """Draw an intrinsics file wrong by just 5 % in alpha, up or down, and right in all else."""
+    return shown(drawn(rng), usual(rng), rng, _scaled_alpha(rng.choice([0.95, 1.05])))
+
+
 def wrong_camera_little(rng: np.random.Generator) -> Case:
     """Draw an intrinsics file wrong by up to 1.5 % in alpha and 6 px in the principal point."""
     return shown(drawn(rng), usual(rng), rng, _believing(rng, 0.3))
@@ -116,6 +121,15 @@ def _believing(rng: np.random.Generator, part: float = 1.0) -> CellSettings:
         i.alpha_u * (1 + share + aspect), i.alpha_v * (1 + share - aspect),
         i.u0 + off[0], i.v0 + off[1], i.k1, i.k2, i.width, i.height,
     )  # fmt: skip
+    return replace(base, nominal=wrong, known=replace(base.known, intrinsics=wrong))
+
+
+def _scaled_alpha(by: float) -> CellSettings:
+    """Return settings with a camera whose focal length is so many times the true one."""
+    base = settings()
+    assert base.known is not None
+    i = base.known.intrinsics
+    wrong = replace(i, alpha_u=i.alpha_u * by, alpha_v=i.alpha_v * by)
     return replace(base, nominal=wrong, known=replace(base.known, intrinsics=wrong))
 
 

@@ -31,10 +31,10 @@ def with_checkers(scene: Sharp, rng: np.random.Generator, count: int) -> Sharp:
 
 
 def hiding(truth: Truth, rng: np.random.Generator, count: int) -> tuple[Cover, ...]:
-    """Return covers over so many of the marks in sight, P1 and P8 not both."""
+    """Return covers over so many of the marks in sight, P1 or P8 left."""
     while True:
         names = [str(n) for n in rng.permutation(list(mark_pixels(truth)))[:count]]
-        if not {"P1", "P8"} <= set(names):
+        if _sound_left(truth, names):
             pixels = mark_pixels(truth)
             return tuple(cover_over(pixels[n], 1.6 * mark_reach(truth, n), rng) for n in names)
 
@@ -43,12 +43,18 @@ def reflections(truth: Truth, rng: np.random.Generator, count: int) -> tuple[Gla
     """Return reflections near so many of the marks in sight."""
     pixels = mark_pixels(truth)
     names = [str(n) for n in rng.permutation(list(pixels))[:count]]
-    while count < 4 and {"P1", "P8"} <= set(names):
+    while count < 4 and not _sound_left(truth, names):
         names = [str(n) for n in rng.permutation(list(pixels))[:count]]
     return tuple(
         Glare(pixels[n] + rng.normal(0.0, 12.0, 2), rng.uniform(6.0, 40.0), rng.uniform(0.1, 1.5))
         for n in names
     )
+
+
+def _sound_left(truth: Truth, hidden: list[str]) -> bool:
+    """Say whether without the hidden marks one is left that lies off the plane of the others."""
+    seen = in_sight(truth, true_camera())
+    return bool({"P1", "P8"} & set(seen) - set(hidden))
 
 
 def covers_over(truth: Truth, rng: np.random.Generator, whole: int, part: int) -> tuple[Cover, ...]:
@@ -69,6 +75,8 @@ def mark_pixels(truth: Truth) -> dict[str, Array]:
     camera = true_camera()
     pose = camera_from_world() @ truth.world_from_object
     names = in_sight(truth, camera, 4.0)
+    if not names:
+        return {}
     return dict(zip(names, project(camera, pose, truth.leg.points(tuple(names))), strict=True))
 
 

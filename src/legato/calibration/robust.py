@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from legato.calibration.camera import explains
 from legato.calibration.cost import prepare
 from legato.calibration.degeneracy import inspect
 from legato.calibration.heldout import Suspects, held_out, suspects, without
@@ -49,13 +50,16 @@ def solve_robust(
     """Solve; where one or two marks beyond doubt spoil the fit, solve again without them.
 
     They are left out only if their absence heals the fit, nothing else explains it about as well,
-    and the rest is enough and not degenerate; the sigmas are then doubled. Raises CalibrationError
-    as `solve` does.
+    another camera neither, and the rest is enough and not degenerate; the sigmas are then doubled.
+    Raises CalibrationError as `solve` does.
     """
     whole = solve(problem, engine, settings, rng, marks)
     first = suspects(problem, whole, settings, rng)
     unchanged = Robust(whole, problem, (), first, first)
     if not first.names or first.others:
+        return unchanged
+    # What the marks hold against one of them they may hold against the camera's file.
+    if explains(problem, whole.genes):
         return unchanged
     rest = without(problem, first.names)
     # With free intrinsics one mark off the plane of all others decides alone: it has no judge.

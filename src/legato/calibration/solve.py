@@ -77,7 +77,7 @@ def check_count(problem: Problem, free: bool) -> None:
     if len(problem.names) < least:
         camera = "free" if free else "known"
         raise CalibrationError(
-            f"{len(problem.names)} marks are too few with {camera} intrinsics",
+            f"{_counted(len(problem.names))} too few with {camera} intrinsics",
             f"find at least {least}",
         )
 
@@ -111,3 +111,7 @@ def _check_known(problem: Problem) -> None:
         raise CalibrationError(f"covariance of the intrinsics has shape {c.shape}", "give 6 by 6")
     if not np.allclose(c, c.T, rtol=1e-6) or np.linalg.eigvalsh(c).min() < -1e-9 * np.trace(c):
         raise CalibrationError("covariance of the intrinsics is not symmetric and positive")
+
+
+def _counted(marks: int) -> str:
+    return "1 mark is" if marks == 1 else f"{marks} marks are"

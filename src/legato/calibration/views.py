@@ -28,9 +28,10 @@ from legato.calibration.problem import (
 from legato.calibration.solve import LEAST_KNOWN, check_data
 from legato.calibration.uncertainty import noise_limit
 from legato.geometry.projection import Intrinsics
-from legato.geometry.transforms import Array, rotation_from_vector, skew
+from legato.geometry.transforms import Array, angle_between, rotation_from_vector, skew
 
 LEAST_VIEWS = 10
+SAME_RAD, SAME_MM = 0.01, 1.0  # views no farther apart tell the camera nothing new
 ROUNDS = 100
 
 
@@ -92,7 +93,8 @@ def calibrate_views(
     """
     if len(views) < least_views:
         raise CalibrationError(
-            f"{len(views)} views are too few", f"take at least {least_views}, from all around"
+            f"{len(views)} {'view is' if len(views) == 1 else 'views are'} too few",
+            f"take at least {least_views}, from all around",
         )
     views = [replace(v, known=None) for v in views]
     for number, view in enumerate(views, start=1):
@@ -103,6 +105,19 @@ def calibrate_views(
     state = _State(start[0], start[1], bundle.given)
     state, information, converged = _adjust(bundle, state)
     return _report(views, names, bundle, state, information, converged)
+
+
+def repeats(poses: Array) -> dict[int, int]:
+    """Return the views (V, 4, 4) that show the leg as an earlier one does, each with that one."""
+    found: dict[int, int] = {}
+    for later in range(len(poses)):
+        for earlier in range(later):
+            apart = np.linalg.norm(poses[later, :3, 3] - poses[earlier, :3, 3])
+            turn = angle_between(poses[later, :3, :3], poses[earlier, :3, :3])
+            if earlier not in found and apart < SAME_MM and turn < SAME_RAD:
+                found[later] = earlier
+                break
+    return found
 
 
 def _check_view(view: Problem, number: int, size: tuple[int, int]) -> None:

@@ -4,6 +4,7 @@ A pose counts the marks that face the camera and lie near a candidate whose edge
 mark's would.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -12,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from legato.geometry.leg import Leg
-from legato.geometry.projection import Intrinsics, distort
+from legato.geometry.projection import Intrinsics, distort, pinhole_pixels
 from legato.geometry.transforms import Array, apply, rotation_from_vector, transform
 from legato.vision.saddle import Candidates
-from legato.vision.view import SMALLEST_FACING
+from legato.vision.view import SMALLEST_FACING, View, fit_view
 
 MOST_TRIPLES = 2000  # ordered triples of candidates tried for one triple of marks
 LEAST_NEAR = 7  # neighbours that each candidate is combined with
 DRAWN_TRIPLES = 300  # of far-off candidates where only neighbours are tried
+PRONOUNCED = 12  # first candidates that are combined with one another all the same
 SIDES = (7.0, 200.0)  # px that a mark's side measures in a picture
 REACH = 24.0  # px at width 768 within which a pose from wrong intrinsics still counts
 EDGE_TOLERANCE = np.radians(18.0)
@@ -91,18 +93,30 @@ def crowded(n: int) -> bool:
 
 
 def candidate_triples(pixels: Array, rng: np.random.Generator) -> NDArray[np.intp]:
-    """Return ordered triples (T, 3) of candidates (N, 2): all, or of neighbours and a draw."""
+    """Return ordered triples (T, 3) of candidates (N, 2), the most pronounced first.
+
+    All of them, or where that is too many those of the first few, of neighbours, and a draw.
+    """
     n = len(pixels)
-    if not crowded(n):
-        every = np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    else:
+    all_of = n if not crowded(n) else min(n, PRONOUNCED)
+    every = np.stack(np.meshgrid(*[np.arange(all_of)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    if all_of < n:
         near = max(LEAST_NEAR, int(0.5 + np.sqrt(0.25 + MOST_TRIPLES / n)))
         away = np.linalg.norm(pixels[:, None] - pixels, axis=-1)
         neighbours = np.argsort(away, axis=1, kind="stable")[:, 1 : near + 1]
         j, k = (x.ravel() for x in np.meshgrid(np.arange(near), np.arange(near)))
         first = np.repeat(np.arange(n), near * near)
-        every = np.stack([first, neighbours[:, j].ravel(), neighbours[:, k].ravel()], axis=-1)
-        every = np.concatenate([every, rng.integers(0, n, size=(DRAWN_TRIPLES, 3))])
+        beside = np.stack([first, neighbours[:, j].ravel(), neighbours[:, k].ravel()], axis=-1)
+        drawn = rng.integers(0, n, size=(DRAWN_TRIPLES, 3))
+        every = np.unique(np.concatenate([every, beside, drawn]), axis=0)
+    i, j, k = every.T
+    return np.asarray(every[(i != j) & (j != k) & (i != k)])
+
+
+def pronounced_triples(n: int) -> NDArray[np.intp]:
+    """Return all ordered triples (T, 3) of the few most pronounced of n candidates."""
+    few = np.arange(min(n, PRONOUNCED))
+    every = np.stack(np.meshgrid(few, few, few, indexing="ij"), axis=-1).reshape(-1, 3)
     i, j, k = every.T
     return np.asarray(every[(i != j) & (j != k) & (i != k)])
 
@@ -134,6 +148,34 @@ def poses_of(
     poses = transform(rotation_from_vector(r[good]), t[good])
     seen = target.facing(poses)[:, list(triple)].min(axis=1) > SMALLEST_FACING
     return np.asarray(poses[seen])
+
+
+def view_of_named(named: Mapping[str, Array], leg: Leg, nominal: Intrinsics) -> View | None:
+    """Return the view that most marks named at pixels (2,) agree with; None for fewer than four.
+
+    Poses come from triples, so that one wrong name does not spoil the rest.
+    """
+    names = tuple(named)
+    if len(names) < 4:
+        return None
+    target, pixels = Target.of(leg), np.array([named[n] for n in names])
+    points, ideal = leg.points(names), pinhole_pixels(nominal, pixels)
+    index = [leg.names().index(n) for n in names]
+    best: tuple[float, View] | None = None
+    for rows in combinations(range(len(names)), 3):
+        triple = tuple(index[k] for k in rows)
+        for pose in poses_of(target, triple, np.array([rows]), ideal, nominal):
+            off = np.linalg.norm(View(nominal, pose).pixels(points) - pixels, axis=-1)
+            value = float(np.minimum(np.nan_to_num(off, nan=np.inf), 30.0).sum())
+            if best is None or value < best[0]:
+                best = (value, View(nominal, pose))
+    if best is None:
+        return None
+    off = np.linalg.norm(best[1].pixels(points) - pixels, axis=-1)
+    near = off < max(30.0, 2.0 * float(np.median(off)))
+    if near.sum() < 4:
+        return best[1]
+    return fit_view(best[1], nominal, points[near], pixels[near], 0.7, rounds=20)[0]
 
 
 def most_telling(

@@ -5,9 +5,8 @@ explains: marks that face the camera near candidates whose edges run as a pasted
 The best poses are fitted, assigned one to one, and freed of their worst marks.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from legato.vision.hypotheses import (
     mark_triples,
     most_telling,
     poses_of,
+    pronounced_triples,
     scale_of,
 )
 from legato.vision.marks import MarksNotFound
@@ -126,34 +126,6 @@ def _first_confirmed(
     return next((r for r in found[:MOST_CONFIRMED] if confirm(r)), None), found
 
 
-def view_of_named(named: Mapping[str, Array], leg: Leg, nominal: Intrinsics) -> View | None:
-    """Return the view that most marks named at pixels (2,) agree with; None for fewer than four.
-
-    Poses come from triples, so that one wrong name does not spoil the rest.
-    """
-    names = tuple(named)
-    if len(names) < 4:
-        return None
-    target, pixels = Target.of(leg), np.array([named[n] for n in names])
-    points, ideal = leg.points(names), pinhole_pixels(nominal, pixels)
-    index = [leg.names().index(n) for n in names]
-    best: tuple[float, View] | None = None
-    for rows in combinations(range(len(names)), 3):
-        triple = tuple(index[k] for k in rows)
-        for pose in poses_of(target, triple, np.array([rows]), ideal, nominal):
-            off = np.linalg.norm(View(nominal, pose).pixels(points) - pixels, axis=-1)
-            value = float(np.minimum(np.nan_to_num(off, nan=np.inf), 30.0).sum())
-            if best is None or value < best[0]:
-                best = (value, View(nominal, pose))
-    if best is None:
-        return None
-    off = np.linalg.norm(best[1].pixels(points) - pixels, axis=-1)
-    near = off < max(30.0, 2.0 * float(np.median(off)))
-    if near.sum() < 4:
-        return best[1]
-    return fit_view(best[1], nominal, points[near], pixels[near], 0.7, rounds=20)[0]
-
-
 def _rounds(
     candidates: Candidates,
     target: Target,
@@ -177,6 +149,10 @@ def _rounds(
             yield found
     for part in _search(candidates, target, nominal, rng, prior, rounds):
         yield _distinct(found + part)
+    if crowded(len(candidates)) and rounds is None:
+        # Marks may be among the most pronounced places and yet no neighbours of one another.
+        for part in _search(candidates, target, nominal, rng, None, MOST_ROUNDS, pronounced=True):
+            yield _distinct(found + part)
 
 
 def _search(
@@ -186,8 +162,12 @@ def _search(
     rng: np.random.Generator,
     prior: View | None,
     rounds: int | None,
+    pronounced: bool = False,
 ) -> Iterator[list[Labelling]]:
-    """Yield what was found after each triple of marks, by falling worth."""
+    """Yield what was found after each triple of marks, by falling worth.
+
+    Each is tried on neighbours above all, or on the most `pronounced` candidates.
+    """
     found: list[Labelling] = []
     tried: list[dict[int, int]] = []
     if prior is not None:
@@ -196,10 +176,14 @@ def _search(
         if found:
             yield found
     pixels = pinhole_pixels(nominal, candidates.pixels)
-    many = crowded(len(candidates))
+    many = crowded(len(candidates)) and not pronounced
     most = _affordable(len(candidates)) if rounds is None else rounds
     for triple in mark_triples(target, most, many):
-        chosen = candidate_triples(candidates.pixels, rng)
+        chosen = (
+            pronounced_triples(len(candidates))
+            if pronounced
+            else candidate_triples(candidates.pixels, rng)
+        )
         poses = poses_of(target, triple, chosen, pixels, nominal)
         before = len(found)
         for pose in most_telling(poses, candidates, target, nominal):
@@ -246,6 +230,8 @@ def _settle(
     names = target.leg.names()
     named = {names[m]: n for m, n in sorted(chosen.items())}
     unseen = view.unseen(target.leg, 10.0)
+    if len(named.keys() - unseen.keys()) < LEAST_MARKS:
+        return None  # marks that could not be seen from there, say too far off
     missing = sum(1 for n in names if n not in unseen and n not in named)
     return Labelling(view, named, rms, len(named) - 0.5 * missing - 0.2 * rms)
 

@@ -11,7 +11,8 @@ import numpy as np
 from legato.geometry.leg import Leg
 from legato.geometry.projection import Intrinsics
 from legato.geometry.transforms import Array, apply
-from legato.vision.label import Labelling, label, view_of_named
+from legato.vision.hypotheses import view_of_named
+from legato.vision.label import Labelling, label
 from legato.vision.marks import FoundMark, MarksNotFound, Picking
 from legato.vision.overlay import NotThere
 from legato.vision.picture import Grey

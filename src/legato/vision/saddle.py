@@ -20,6 +20,8 @@ LEAST_CONTRAST = 5.0  # grey levels from the mean to white or black
 MOST_PROPOSALS = 400
 RADII = (2.6, 4.0, 6.0)  # px at a picture width of 768
 SPOKES = 48
+FEW, COARSER = 9, 1.8  # places below which a picture may be blurred, and the scale to look at then
+NEW = 8.0  # px from every place already found
 
 
 @dataclass(frozen=True)
@@ -46,11 +48,26 @@ def find_saddles(image: Grey, most: int = 80) -> Candidates:
     """Return at most `most` candidates of a grey picture (H, W), to a few tenths of a pixel.
 
     A large picture is searched at its own scale and at that of one 768 px wide, since marks may
-    be large in it or small.
+    be large in it or small; one that shows few places also more coarsely, as it may be blurred.
     """
     levels = np.asarray(image, dtype=np.float32)
     wide = image.shape[1] / 768.0
     passes = [_at_scale(levels, scale) for scale in ((1.0, wide) if wide > 1.3 else (1.0,))]
+    found = _joined(passes, most)
+    if len(found) < min(FEW, most):
+        coarse = _joined([_at_scale(levels, COARSER * max(1.0, wide))], most)
+        # Where both see a mark the finer look is the better.
+        away = np.linalg.norm(coarse.pixels[:, None] - found.pixels, axis=-1).min(
+            axis=1, initial=np.inf
+        )
+        new = coarse.take(np.flatnonzero(away > NEW)[: most - len(found)])
+        pairs = zip(vars(found).values(), vars(new).values(), strict=True)
+        found = Candidates(*(np.concatenate(pair) for pair in pairs))
+    return found
+
+
+def _joined(passes: list[tuple[Array, Array, Array]], most: int) -> Candidates:
+    """Return the candidates of several scales by falling contrast, each place once."""
     pixels, contrast, edges = (np.concatenate(columns) for columns in zip(*passes, strict=True))
     order = np.argsort(-contrast, kind="stable")
     chosen = order[_apart(pixels[order], 4.0)][:most]

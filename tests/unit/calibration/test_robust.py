@@ -185,3 +185,18 @@ def test_no_wrong_pose_is_accepted(scenes: Any, data: Any) -> None:
         turned, _ = scene.errors(found.solution.camera_from_object)
         assert np.degrees(turned) <= MOST_DEG
         assert worst_station(scenes, scene, found) <= MOST_MM
+
+
+def test_a_wrong_camera_is_blamed_on_no_mark(scenes: Any) -> None:
+    """Where another camera would make every mark fit, none is left out and the fit is refused."""
+    blamed = 0
+    for seed in range(12):
+        scene = scenes.random(seed, scenes.ten, sigma=0.02)
+        i = scene.intrinsics
+        wrong = replace(i, alpha_u=0.997 * i.alpha_u, u0=i.u0 - 2.0, v0=i.v0 + 3.0)
+        wrong = replace(wrong, alpha_v=0.997 * i.alpha_v)
+        found = solve(scene.known(intrinsics=wrong))
+        assert found.left_out == ()
+        assert not accepted(found)
+        blamed += bool(found.all_marks.names) and not found.all_marks.others
+    assert blamed, "in none of the scenes would a mark have been left out"

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from legato.calibration.problem import CalibrationError, EngineSettings, Problem
-from legato.calibration.views import calibrate_views
+from legato.calibration.views import calibrate_views, repeats
 from legato.geometry.projection import Intrinsics
+from legato.geometry.transforms import rotation_from_vector, transform
 
 CAMERA = Intrinsics(652.0, 655.0, 346.0, 279.0, -0.03, 0.0)
 TRUE = np.array([652.0, 655.0, 346.0, 279.0, -0.03, 0.0])
@@ -79,6 +80,14 @@ def test_too_few_views_are_refused(scenes: Any) -> None:
     """Nine views are refused with the number that is wanted."""
     with pytest.raises(CalibrationError, match=r"9 views are too few.*at least 10"):
         calibrate_views(views_of(scenes, 5, count=9), QUICK, np.random.default_rng(5))
+
+
+def test_views_that_repeat_one_another_are_found() -> None:
+    """A pose within a millimetre and half a degree of an earlier one is no new view."""
+    turns = (0.0, 0.005, 0.3, 0.301, 0.0)
+    poses = np.array([transform(rotation_from_vector([0.0, t, 0.0]), np.zeros(3)) for t in turns])
+    poses[4, 0, 3] = 1.5
+    assert repeats(poses) == {1: 0, 3: 2}
 
 
 def test_an_unusable_view_is_named(scenes: Any) -> None:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from legato.geometry.transforms import Array
-from legato.vision.label import Labelling, label, view_of_named
+from legato.vision.hypotheses import view_of_named
+from legato.vision.label import Labelling, label
 from legato.vision.marks import MarksNotFound
 from legato.vision.saddle import Candidates, find_saddles
 from legato.vision.view import View
