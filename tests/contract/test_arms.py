@@ -1,7 +1,7 @@
 """What every arm driver promises, held by the simulated arm and by the TeachMover's alike.
 
 The TeachMover's driver talks through a real pseudo-terminal to an emulated controller over the
-same simulated world.
+same simulated world. Each is held to it alone, and within an arm that could go wrong.
 """
 
 import threading
@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legato.drivers.emulator import Emulator, Faults, PseudoTerminal, fault
+from legato.drivers.faulty.arm import faulty_arm
 from legato.drivers.sim.arm import SimArm
 from legato.drivers.sim.clock import ManualClock, SimClock
 from legato.drivers.sim.settings import SimSettings
@@ -70,6 +71,21 @@ def simulated() -> Iterator[Bench]:
 
 
 @contextmanager
+def wrapped() -> Iterator[Bench]:
+    """Wrap the simulated arm in one that could go wrong, and does not."""
+    world = still_world()
+    yield Bench(faulty_arm(SimArm(world), (), world.clock), world)
+
+
+@contextmanager
+def wrapped_over_a_line() -> Iterator[Bench]:
+    """Wrap the TeachMover's driver in the same way."""
+    with over_a_line() as made:
+        made.arm = faulty_arm(made.arm, (), SimClock())
+        yield made
+
+
+@contextmanager
 def over_a_line(
     *faults: str, clock: Clock | None = None, margin_s: float = 3.0, link: Path | None = None
 ) -> Iterator[Bench]:
@@ -105,7 +121,12 @@ def over_a_line(
                 cut()
 
 
-BENCHES = {"sim": simulated, "teachmover": over_a_line}
+BENCHES = {
+    "sim": simulated,
+    "teachmover": over_a_line,
+    "faulty sim": wrapped,
+    "faulty teachmover": wrapped_over_a_line,
+}
 
 
 @pytest.fixture(params=BENCHES)

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from legato.drivers.faulty.camera import FaultyCamera
 from legato.drivers.opencv import CameraSettings, OpenCVCamera
 from legato.drivers.sim.camera import SimCamera
 from legato.drivers.sim.clock import ManualClock
@@ -32,6 +33,12 @@ def simulated(_: Path) -> Camera:
     return SimCamera(sim_world(), WIDTH, HEIGHT)
 
 
+def wrapped(_: Path) -> Camera:
+    """Wrap the simulated camera in one that could go wrong, and does not."""
+    world = sim_world()
+    return FaultyCamera(SimCamera(world, WIDTH, HEIGHT), (), world.clock)
+
+
 def from_files(folder: Path) -> Camera:
     """Make OpenCV's driver over numbered files."""
     rng = np.random.default_rng(1)
@@ -42,7 +49,7 @@ def from_files(folder: Path) -> Camera:
     return OpenCVCamera(CameraSettings(source=source, width=WIDTH, height=HEIGHT))
 
 
-@pytest.fixture(params=[simulated, from_files])
+@pytest.fixture(params=[simulated, wrapped, from_files])
 def camera(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Camera]:
     """Each driver in turn, not opened yet."""
     make: Callable[[Path], Camera] = request.param
@@ -54,7 +61,7 @@ def camera(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Camera]:
 def test_it_is_a_camera_that_says_whether_it_is_real(camera: Camera) -> None:
     """It has every member of the protocol."""
     assert isinstance(camera, Camera)
-    assert camera.simulated is isinstance(camera, SimCamera)
+    assert camera.simulated is isinstance(camera, SimCamera | FaultyCamera)
 
 
 def test_nothing_comes_before_open_and_after_close(camera: Camera) -> None:

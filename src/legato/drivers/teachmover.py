@@ -7,13 +7,13 @@ its reply says done; once in doubt it stays so until the registers are zeroed.
 """
 
 import termios
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Annotated, Protocol
 
 from msgspec import Meta, Struct
 
+from legato.drivers.line_log import CAME, SENT, LineLog
 from legato.geometry.motion import StepMove
 from legato.hal.arm import ArmReading
 from legato.hal.clock import Clock
@@ -36,7 +36,6 @@ from legato.wire.teachmover_lines import LONGEST_LINE, WireError
 POLL_S = 0.05  # longest wait inside pyserial; silence for so long means that the line is quiet
 BITS = 10  # of one character, 8N1
 QUIET = 4  # characters whose time must pass before a slow line counts as quiet
-KEPT = 40  # chunks of the line kept as evidence
 
 
 class TeachMoverSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -104,7 +103,7 @@ class TeachMover:
         self._settled = False
         self._owes = False  # whether the answer to an earlier read may still come
         self._in_doubt = False
-        self._line: deque[tuple[float, str, bytes]] = deque(maxlen=KEPT)
+        self._line = LineLog(LONGEST_LINE)
 
     @property
     def simulated(self) -> bool:
@@ -119,7 +118,7 @@ class TeachMover:
     @property
     def last_bytes(self) -> tuple[str, ...]:
         """The last chunks on the line, oldest first: time in s, direction, bytes. Evidence."""
-        return tuple(f"{t:.3f} {way} {data!r}" for t, way, data in self._line)
+        return self._line.told()
 
     def open(self) -> None:
         """Open the port and see that a TeachMover answers; open again after it was lost."""
@@ -185,7 +184,8 @@ class TeachMover:
 
     def _settle(self) -> None:
         """Read registers until their answer comes through: all earlier replies then lie behind."""
-        for last in (False, True):
+        # The first may time out, and cut a late reply in two, whose rest then spoils the second.
+        for last in (False, False, True):
             try:
                 reply = self._exchange(Read())
             except DeviceError:
@@ -221,17 +221,17 @@ class TeachMover:
         self._parser.reset()
         self._send(data)
         self._parser.expect(command)
-        deadline = self._clock.monotonic() + allowed
+        deadline, late = self._clock.monotonic() + allowed, False
         try:
             while (reply := self._parser.next_event()) is None:
-                if self._clock.monotonic() > deadline:
+                if late:
                     self._settled = False
                     self._owes = self._owes or isinstance(command, Read)
-                    raise DeviceError(
-                        Cause.ARM_TIMEOUT,
-                        f"no reply to {data!r} within {allowed:.2f} s",
-                        "see that the arm is switched on and its cable plugged in",
-                    )
+                    text = f"no reply to {data!r} within {allowed:.2f} s"
+                    hint = "see that the arm is switched on and its cable plugged in"
+                    raise DeviceError(Cause.ARM_TIMEOUT, text, hint)
+                # One more look when the time is up: who was frozen finds the reply waiting.
+                late = self._clock.monotonic() > deadline
                 self._parser.receive(self._receive())
         except WireError as error:
             self._settled = False
@@ -246,7 +246,7 @@ class TeachMover:
         port = self._connected()
         try:
             port.reset_input_buffer()
-            self._note(">", data)
+            self._line.add(self._clock.monotonic(), SENT, data)
             port.write(data)
         except (OSError, termios.error) as error:
             raise self._lost(error) from error
@@ -259,7 +259,7 @@ class TeachMover:
         except (OSError, termios.error) as error:
             raise self._lost(error) from error
         if data:
-            self._note("<", data)
+            self._line.add(self._clock.monotonic(), CAME, data)
         return data
 
     def _connected(self) -> Port:
@@ -292,7 +292,3 @@ class TeachMover:
             f"the arm refused {encode(command)!r}",
             "see that the arm is in serial mode and speaks this protocol",
         )
-
-    def _note(self, way: str, data: bytes) -> None:
-        """Keep a chunk as evidence."""
-        self._line.append((self._clock.monotonic(), way, data))

@@ -6,10 +6,10 @@ the same way. Batches, NaN, deep or huge documents and parameters by position ar
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Final, cast
+from typing import Any, Final, Literal, cast
 
 import msgspec
+from msgspec import UNSET, Struct, UnsetType
 
 from legato.wire.requests import REQUESTS, STOP_LINE, Ping, Request, StopNow
 
@@ -47,24 +47,34 @@ class Failure(Exception):
         super().__init__(f"{name}: {reason}")
 
 
-@dataclass(frozen=True)
-class Call:
+class Call(Struct, frozen=True):
     """A well-formed request: who is to be answered, and what is asked."""
 
     route: Route
     method: str
-    params: Mapping[str, Any] = field(default_factory=dict)
+    params: Mapping[str, Any] = {}
     id: Id = None
     notification: bool = False
 
 
-@dataclass(frozen=True)
-class Malformed:
+class Malformed(Struct, frozen=True):
     """A message that is no request, with the error to answer."""
 
     route: Route
     failure: Failure
     id: Id = None
+
+
+class _Envelope(Struct, frozen=True, forbid_unknown_fields=True):
+    """A request as nearly all are."""
+
+    jsonrpc: Literal["2.0"]
+    method: str
+    id: int | float | str | UnsetType | None = UNSET
+    params: dict[str, Any] = {}
+
+
+_ENVELOPE: Final = msgspec.json.Decoder(_Envelope)
 
 
 def receive(frames: Sequence[bytes]) -> Call | Malformed:
@@ -76,12 +86,15 @@ def receive(frames: Sequence[bytes]) -> Call | Malformed:
     if len(body) > MAX_BYTES:
         text = f"{len(body)} bytes, at most {MAX_BYTES}"
         return Malformed(route, Failure("invalid_request", text))
+    # So few brackets cannot nest too deep; most requests need no closer look.
+    shallow = body.count(b"{") + body.count(b"[") <= MAX_DEPTH
+    usual = _usual(route, body) if shallow else None
+    if usual is not None:
+        return usual
     try:
         document = msgspec.json.decode(body)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError, ValueError) as error:
         return Malformed(route, Failure("parse_error", f"not JSON: {error}"))
-    # So few brackets cannot nest deeper; most requests need no closer look.
-    shallow = body.count(b"{") + body.count(b"[") <= MAX_DEPTH
     return _call(route, document, shallow=shallow)
 
 
@@ -125,19 +138,34 @@ def encode(document: Any) -> bytes:
 
     Arrays and numpy's numbers go as lists and numbers; what JSON cannot say goes as its text.
     """
-    return msgspec.json.encode(document, enc_hook=_plain)
+    return _ENCODER.encode(document)
 
 
 def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
+_ENCODER: Final = msgspec.json.Encoder(enc_hook=_plain)
+
+
 def _split(frames: Sequence[bytes]) -> tuple[Route, bytes | None]:
     """Return whom to answer and how, and the body, None where there is not exactly one."""
-    identity, rest = frames[0], list(frames[1:])
-    if rest and rest[0] == b"" and len(rest) > 1:
-        return (identity, b""), rest[1] if len(rest) == 2 else None
-    return (identity,), rest[0] if len(rest) == 1 else None
+    if len(frames) == 2:
+        return (frames[0],), frames[1]
+    if len(frames) > 2 and frames[1] == b"":
+        return (frames[0], b""), frames[2] if len(frames) == 3 else None
+    return (frames[0],), None
+
+
+def _usual(route: Route, body: bytes) -> Call | None:
+    """Return the call of a body as nearly all are; None where it needs a closer look."""
+    try:
+        asked = _ENVELOPE.decode(body)
+    except (msgspec.MsgspecError, UnicodeDecodeError):
+        return None
+    if asked.id is UNSET:
+        return Call(route, asked.method, asked.params, notification=True)
+    return Call(route, asked.method, asked.params, asked.id) if _is_id(asked.id) else None
 
 
 def _call(route: Route, document: Any, *, shallow: bool) -> Call | Malformed:

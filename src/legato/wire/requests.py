@@ -4,17 +4,20 @@ Names and meanings are part of the wire. Unknown parameters and wrong types are 
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 from msgspec import Meta, Struct
 
 API: Final = "1"
 OUTCOMES: Final = ("done", "stopped", "refused", "fault", "interrupted")
-TOPICS: Final = ("state", "progress", "telemetry", "contact", "fault", "session", "heartbeat")
+TOPICS: Final = (
+    "state", "progress", "telemetry", "contact", "fault", "session", "campaign", "heartbeat",
+)  # fmt: skip
 
 Name = Annotated[str, Meta(min_length=1, max_length=128)]
 Point = tuple[float, float, float]
+Picks = Annotated[dict[Name, tuple[float, float]], Meta(min_length=1, max_length=100)]
 
 
 class Ping(Struct, frozen=True, forbid_unknown_fields=True):
@@ -49,7 +52,16 @@ class Job(Acting, frozen=True, kw_only=True):
     key: Name | None = None
 
 
-class Run(Job, frozen=True):
+class Picking(Job, frozen=True, kw_only=True):
+    """A job that finds the leg; `picks` are marks that a person has named, by place (u, v) in px.
+
+    They hold for the second picture of verify too, until the leg is found anew.
+    """
+
+    picks: Picks | None = None
+
+
+class Run(Picking, frozen=True, kw_only=True):
     """Find the leg, verify, go home, massage every station, go home."""
 
 
@@ -57,7 +69,7 @@ class Capture(Job, frozen=True):
     """Take a picture."""
 
 
-class Calibrate(Job, frozen=True):
+class Calibrate(Picking, frozen=True, kw_only=True):
     """Find the leg in the last picture, or in a new one."""
 
 
@@ -71,6 +83,35 @@ class Home(Job, frozen=True):
 
 class Massage(Job, frozen=True):
     """Massage every station with the verified calibration."""
+
+
+class Campaign(Acting, frozen=True, kw_only=True):
+    """Repeat a job, so many times or until a time, at once or every so often.
+
+    It ends with the first of `count`, `for_s` and `until` (an ISO time with its zone), of which one
+    is given. `every_s`, from start to start, and `for_s` are the cell's s. A fault of the camera is
+    reset by itself at most `resets` times; any other fault, and any stop, ends it. The same `key`
+    again starts nothing.
+    """
+
+    job: Literal["run", "capture", "calibrate", "verify", "home", "massage"] = "run"
+    count: Annotated[int, Meta(ge=1, le=10_000)] | None = None
+    every_s: Annotated[float, Meta(ge=0, le=604_800)] = 0.0
+    for_s: Annotated[float, Meta(gt=0, le=31_622_400)] | None = None
+    until: Name | None = None
+    resets: Annotated[int, Meta(ge=0, le=100)] = 0
+    key: Name | None = None
+
+
+class EndCampaign(Acting, frozen=True):
+    """Let the repetition under way end, and begin no other."""
+
+
+class Campaigns(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Return a campaign's summary, or list the latest campaigns, newest first."""
+
+    campaign: Name | None = None
+    limit: Annotated[int, Meta(ge=1, le=200)] = 20
 
 
 class Pause(Acting, frozen=True):
@@ -156,7 +197,7 @@ class Shutdown(Acting, frozen=True):
 
 Request = (
     Ping | Status | Describe | Wait | Sessions | Session | EventsSince | Shutdown | Job
-    | Pause | Resume | Stop | Estop | Reset | Reference | Lease
+    | Pause | Resume | Stop | Estop | Reset | Reference | Lease | Campaign | EndCampaign | Campaigns
 )  # fmt: skip
 
 REQUESTS: Final[dict[str, type[Struct]]] = {
@@ -169,6 +210,9 @@ REQUESTS: Final[dict[str, type[Struct]]] = {
     "verify": Verify,
     "home": Home,
     "massage": Massage,
+    "campaign": Campaign,
+    "end_campaign": EndCampaign,
+    "campaigns": Campaigns,
     "pause": Pause,
     "resume": Resume,
     "stop": Stop,

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from legato.drivers.sim.clock import ManualClock
+from legato.drivers.sim.ledger import KEPT, Contact, Ledger, Walk
 from legato.drivers.sim.motors import Motors
 from legato.drivers.sim.settings import SimSettings
 from legato.drivers.sim.world import World
@@ -398,3 +399,16 @@ def test_what_a_stop_a_stall_or_a_rate_takes_counts_as_lost() -> None:
     assert lost[0] == pytest.approx(2000 - 7072 / 4, abs=30)
     assert lost[1] == 100 - 39  # of 405 half-steps a second at 1015
     assert {b["kind"] for b in cell.breaches} == {"limit", "rate"}
+
+
+def test_a_world_that_lasts_for_months_keeps_the_latest() -> None:
+    """Touches and breaches beyond some thousands do not pile up; the last ones are there."""
+    ledger, contact = Ledger(), Contact("leg", 2.0, 0.3)
+    for number in range(KEPT + 10):
+        ledger.breach("rate", "too fast", np.zeros(3), float(number))
+        times = np.array([number, number + 0.2, number + 0.4])
+        walk = Walk(np.array([0.0, 0.5, 1.0]), times, np.zeros((3, 3)), lambda _: (0,) * 6)
+        contact.follow(walk, np.array([1.0, -1.0, 1.0]), np.eye(4))
+    assert len(ledger.breaches) == len(contact.touches) == KEPT
+    assert ledger.breaches[-1]["t_s"] == KEPT + 9.0
+    assert contact.touches[-1].began_s == pytest.approx(KEPT + 9.1)

@@ -137,6 +137,26 @@ def test_silence_ends_after_the_motion_and_a_margin() -> None:
     assert len(port.written) == 1
 
 
+def test_a_process_that_was_frozen_finds_the_reply_waiting() -> None:
+    """A reply that lies in the port when the time is up came in time: nothing is in doubt."""
+    clock = ManualClock()
+
+    class Frozen(ScriptedPort):
+        def read(self, size: int = 1) -> bytes:
+            if self.written[-1].startswith(b"@STEP") and clock.monotonic() < 20.0:
+                clock.sleep(20.0)  # stopped while it waited; the reply came meanwhile
+                self.incoming += b"1\r"
+                return b""
+            return super().read(size)
+
+    arm = TeachMover(
+        TeachMoverSettings(port="/dev/arm"), clock, lambda _: Frozen(clock, [ANSWER, b"", ANSWER])
+    )
+    arm.open()
+    assert arm.step(MOVE).registers == (1, 2, 3, 4, 5, 6)
+    assert not arm.position_in_doubt
+
+
 def test_a_late_reply_is_never_taken_for_the_next_commands() -> None:
     """After a time-out the line is settled by a read: the late 1 does not end the next motion."""
     arm, port, _ = opened()

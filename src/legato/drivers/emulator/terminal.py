@@ -20,13 +20,20 @@ GONE = (errno.EIO, errno.EBADF)
 class PseudoTerminal:
     """A line on which `emulator` answers; a context manager.
 
-    `opened` is told the port's path, now and whenever the line is plugged in again. `busy` is held
-    while a command is carried out.
+    `opened` is told the port's path, now and whenever the line is plugged in again. `passed` is
+    told each chunk as it passes: ">" toward the robot, "<" from it. `busy` is held while a command
+    is carried out.
     """
 
-    def __init__(self, emulator: Emulator, opened: Callable[[str], None] = lambda _: None) -> None:
+    def __init__(
+        self,
+        emulator: Emulator,
+        opened: Callable[[str], None] = lambda _: None,
+        passed: Callable[[str, bytes], None] = lambda _, __: None,
+    ) -> None:
         self._emulator = emulator
         self._opened = opened
+        self._passed = passed
         self._ends: tuple[int, int] | None = None
         self._wake, self._alarm = os.pipe()
         self.busy = threading.Lock()
@@ -43,6 +50,7 @@ class PseudoTerminal:
         """Answer until `stop`; blocks, so give it a thread or the process."""
         while (data := self._receive()) is not None:
             back_s: float | None = None
+            self._passed(">", data)
             with self.busy:
                 for out in self._emulator.talk(data):
                     if isinstance(out, HangUp):
@@ -82,6 +90,7 @@ class PseudoTerminal:
         """Put bytes on the line, if it is there."""
         if self._ends is None:
             return
+        self._passed("<", data)
         try:
             os.write(self._ends[0], data)
         except BlockingIOError:

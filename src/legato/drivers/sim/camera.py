@@ -1,31 +1,41 @@
 """The simulated camera: it renders the true leg, with new noise in each picture."""
 
+from functools import cached_property
+from typing import TYPE_CHECKING
+
 from legato.drivers.sim.world import World
 from legato.geometry.projection import Intrinsics
 from legato.geometry.transforms import invert
 from legato.hal.camera import Frame
 from legato.hal.faults import Cause, DeviceError
 
+if TYPE_CHECKING:
+    from legato.drivers.sim.render import Renderer
+
 
 class SimCamera:
     """A camera that stands in a simulated world, `width` x `height` px."""
 
     def __init__(self, world: World, width: int = 768, height: int = 576) -> None:
-        # OpenCV is loaded with the first camera, not with the package.
+        self._world = world
+        self._width, self._height = width, height
+        self._sequence = 0
+        self._open = False
+
+    @cached_property
+    def _renderer(self) -> "Renderer":
+        """What makes the pictures; loaded with the first of them, since it takes 50 MB."""
         from legato.drivers.sim.render import Renderer, paste_marks
 
-        self._world = world
-        s = world.settings
-        self._renderer = Renderer(
+        world, s = self._world, self._world.settings
+        return Renderer(
             world.leg,
-            Intrinsics(s.alpha_u, s.alpha_v, s.u0, s.v0, s.k1, s.k2, width, height),
+            Intrinsics(s.alpha_u, s.alpha_v, s.u0, s.v0, s.k1, s.k2, self._width, self._height),
             paste_marks(world.leg, s.mark_turn_deg, world.marks_rng),
             blur=s.blur_px,
             noise=s.noise,
             table_z=world.table_z,
         )
-        self._sequence = 0
-        self._open = False
 
     @property
     def simulated(self) -> bool:

@@ -1,9 +1,10 @@
 """What truly happened in the simulated world: touches of the fingertip, and breaches.
 
 A touch begins where the fingertip's clearance crosses zero and ends where it leaves. A breach is
-anything that must not happen: see `World`.
+anything that must not happen: see `World`. The latest thousands are kept: a cell runs for months.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -11,6 +12,8 @@ import numpy as np
 
 from legato.geometry.motion import Steps
 from legato.geometry.transforms import Array
+
+KEPT = 2000  # of each kind: far more than one session has
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ class Contact:
         self._n_per_mm = n_per_mm
         self._switch_n = switch_n
         self._open: Touch | None = None
-        self.touches: list[Touch] = []
+        self.touches: deque[Touch] = deque(maxlen=KEPT)
 
     def forces(self, clearances: Array) -> Array:
         """Return the surface's push (...) on the fingertip at clearances (...)."""
@@ -127,7 +130,7 @@ class Contact:
 class Ledger:
     """Breaches in the order in which they happened."""
 
-    breaches: list[dict[str, object]] = field(default_factory=list)
+    breaches: deque[dict[str, object]] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     def breach(self, kind: str, what: str, where: Array, when: float) -> None:
         """Keep one breach: its kind, a sentence, a place in the world and a time."""

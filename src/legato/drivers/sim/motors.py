@@ -43,7 +43,8 @@ class Motors:
     @property
     def grip_force(self) -> float:
         """Force of the closed fingers on each other."""
-        return GRIP_N_PER_STEP * max(0.0, float(self.shaft[2] - self.shaft[5]))
+        shut = self._model.grip_per_elbow * self.shaft[2] - self.shaft[5]
+        return GRIP_N_PER_STEP * max(0.0, float(shut))
 
     def slip(self, motor: int, steps: int) -> None:
         """Have a motor (1 to 6) miss the next half-steps that it is sent, whichever way."""

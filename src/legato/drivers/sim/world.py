@@ -118,7 +118,7 @@ class World:
     def testimony(self) -> dict[str, object]:
         """Return true poses, touches, breaches and the tip's place now, as JSON-able data."""
         tip, pitch, roll = forward(self.model, self._motors.joints)
-        touches = sorted(self._on_leg.touches + self._on_table.touches, key=lambda t: t.began_s)
+        touches = sorted([*self._on_leg.touches, *self._on_table.touches], key=lambda t: t.began_s)
         return {
             "world_from_object": self.world_from_object.tolist(),
             "world_from_camera": self.world_from_camera.tolist(),
