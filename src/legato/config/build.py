@@ -43,6 +43,7 @@ def arm_model(config: Config) -> ArmModel:
         hand=robot.hand_mm,
         steps_per_rev=robot.steps_per_rev,
         grip_steps_per_mm=robot.grip_steps_per_in / INCH,
+        grip_per_elbow=robot.grip_per_elbow,
         roll_sign=robot.roll_sign,
         rates=robot.rates,
         limits=ArmLimits(
@@ -148,6 +149,10 @@ def cell_settings(loaded: Loaded) -> CellSettings:
         engine=engine_settings(config),
         massage=config.massage,
         simulated=config.robot.driver == "sim",
+        camera_dated_s=loaded.intrinsics.dated().timestamp()
+        if known and loaded.intrinsics
+        else None,
+        camera_days=config.camera.max_intrinsics_age_days,
     )
 
 

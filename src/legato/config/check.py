@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from legato.config.build import arm_model, leg
-from legato.config.endpoints import check_endpoint
+from legato.config.endpoints import check_endpoint, check_listen
 from legato.config.errors import ABSENT, ConfigError
 from legato.config.schema import Config, Point, PoseTable, ServerTable
 from legato.control.states import MASSAGE_DEADLINE, massage_state
+from legato.drivers.faulty.settings import CALLS
 from legato.geometry.arm import Unreachable, reach
 from legato.geometry.transforms import (
     NotARotation,
@@ -30,6 +31,7 @@ MARK_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,15}")
 FEWEST_MARKS = 7
 FEWEST_USED = 6  # with a known camera; the calibration asks for more where it is free
 SURFACE_MM = 0.5
+DEEPEST = 5.0  # mm beyond contact
 STROKE_S = 30.0  # about what a stroke takes beside its dwell
 
 
@@ -43,8 +45,10 @@ def check(config: Config, file: Path) -> None:
     _check_calibration(config, file)
     _check_arm(config, file)
     _check_sim(config, file)
+    _check_faults(config, file)
     _check_massage(config, file)
     _check_records(config, file)
+    check_listen(file, "metrics.listen", config.metrics.listen)
 
 
 def check_server(server: ServerTable, file: Path, *, encrypted: bool) -> None:
@@ -223,9 +227,30 @@ def _check_sim(config: Config, file: Path) -> None:
         _check_aim("sim.camera_looks_at_mm", sim.camera_at_mm, sim.camera_looks_at_mm, file)
 
 
+def _check_faults(config: Config, file: Path) -> None:
+    """Raise ConfigError for a fault without one beginning, or on a call of the other device."""
+    for index, fault in enumerate(config.sim.faults):
+        key = f"sim.faults[{index}]"
+        begins = {n: getattr(fault, n) for n in ("at_s", "call", "p")}
+        given = [name for name, value in begins.items() if value is not None]
+        if len(given) != 1:
+            expected = "one of at_s, call and p: when it begins"
+            value = begins[given[-1]] if given else ABSENT
+            raise ConfigError(file, f"{key}.{given[-1]}" if given else key, value, expected)
+        calls = CALLS[fault.device]
+        if fault.counted not in calls:
+            expected = f"a call of the {fault.device}: {', '.join(calls)}"
+            raise ConfigError(file, f"{key}.on", fault.counted, expected)
+
+
 def _check_massage(config: Config, file: Path) -> None:
-    """Raise ConfigError where a station's strokes cannot end before its state's deadline."""
+    """Raise ConfigError where a press is too deep, or a station's strokes outlast its deadline."""
     massage, draws = config.massage, config.massage.draw
+    if massage.depths[-1] > DEEPEST:
+        expected = (
+            f"{DEEPEST / massage.descent_mm:.0f} steps at most: {DEEPEST:g} mm beyond contact"
+        )
+        raise ConfigError(file, "massage.press_steps", massage.press_steps, expected)
     each = massage.dwell_s + STROKE_S
     whole = massage.strokes * each + draws.count * (draws.dwell_s + STROKE_S)
     if whole < MASSAGE_DEADLINE:

@@ -39,6 +39,28 @@ def check_endpoint(file: Path, key: str, endpoint: str, *, encrypted: bool) -> N
         raise ConfigError(file, key, endpoint, f"an address on loopback: {EXPECTED}", hint)
 
 
+def check_listen(file: Path, key: str, listen: str | bool) -> None:
+    """Raise ConfigError unless `listen` is false, or HOST:PORT on loopback."""
+    expected = "false, or an address on loopback such as 127.0.0.1:9108 (port 0 for a free one)"
+    if listen is False:
+        return
+    address = listen_address(listen) if isinstance(listen, str) else None
+    if address is None:
+        raise ConfigError(file, key, listen, expected)
+    host = _address(address[0])
+    if address[0] != "localhost" and (host is None or not host.is_loopback):
+        hint = "let a proxy or an agent on this machine carry them further"
+        raise ConfigError(file, key, listen, expected, hint)
+
+
+def listen_address(listen: str) -> tuple[str, int] | None:
+    """Return host and port of HOST:PORT, an IPv6 host without brackets; None where it is none."""
+    match = re.fullmatch(r"(?P<host>\[[^\]]+\]|[^:\[\]]+):(?P<port>\d{1,5})", listen)
+    if match is None or int(match["port"]) > 65535:
+        return None
+    return match["host"].removeprefix("[").removesuffix("]"), int(match["port"])
+
+
 def resolved(endpoint: str, folder: Path) -> str:
     """Return an endpoint whose socket path, if any, is absolute."""
     path = endpoint.removeprefix("ipc://")

@@ -1,10 +1,12 @@
 """The intrinsics file: what calibrating the camera from many views found, with its error.
 
 TOML with alpha_u alpha_v u0 v0 (px), k1 k2, covariance (6x6 in that order), width height (px),
-views, rms_px and created (ISO time).
+views, rms_px and created (ISO time); residuals by view and by mark; and, where they were asked
+for, the marks' own places.
 """
 
-from datetime import datetime
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +25,9 @@ SMALLEST_EIGENVALUE = -1e-9  # of a covariance scaled to a unit diagonal; roundi
 
 COMMENT = """The camera's intrinsics, made by `legato intrinsics` from pictures of the leg model.
 alpha_u, alpha_v, u0, v0 in px; k1, k2 radial distortion without unit, in OpenCV's convention.
-covariance: of alpha_u, alpha_v, u0, v0, k1, k2, in that order. They hold for this picture size."""
+covariance: of alpha_u, alpha_v, u0, v0, k1, k2, in that order. They hold for this picture size.
+view_rms_px, mark_rms_px: residuals by picture and by mark. marks: their places (mm) as the pictures
+show them, where they were asked for: put them into [leg.marks] to use them."""
 
 
 class IntrinsicsFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -41,6 +45,14 @@ class IntrinsicsFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     views: Annotated[int, Meta(ge=1)]
     rms_px: Annotated[float, Meta(ge=0)]
     created: str
+    view_rms_px: tuple[float, ...] = ()
+    mark_rms_px: dict[str, float] = {}
+    marks: dict[str, tuple[float, float, float]] = {}
+
+    def dated(self) -> datetime:
+        """Return when the camera was calibrated; a date without a zone counts as UTC."""
+        made = datetime.fromisoformat(self.created)
+        return made if made.tzinfo else made.replace(tzinfo=UTC)
 
     def known(self) -> KnownIntrinsics:
         """Return what the calibration is given."""
@@ -89,12 +101,20 @@ def covariance_problem(covariance: np.ndarray) -> str:
 
 
 def write_intrinsics(
-    file: Path, known: KnownIntrinsics, *, views: int, rms_px: float, created: str
+    file: Path,
+    known: KnownIntrinsics,
+    *,
+    views: int,
+    rms_px: float,
+    created: str,
+    view_rms_px: Sequence[float] = (),
+    mark_rms_px: Mapping[str, float] | None = None,
+    marks: Mapping[str, Sequence[float]] | None = None,
 ) -> IntrinsicsFile:
     """Write `file`, replacing it whole, and return what stands in it.
 
-    `created` is an ISO date and time. Raises OSError, and ConfigError where the values are such
-    that the file would be refused.
+    `created` is an ISO date and time; `marks` are places in mm, where they were estimated. Raises
+    OSError, and ConfigError where the values are such that the file would be refused.
     """
     i = known.intrinsics
     rows = np.asarray(known.covariance, dtype=float).tolist()
@@ -110,8 +130,13 @@ def write_intrinsics(
         "views": int(views),
         "rms_px": float(rms_px),
         "created": created,
+        "view_rms_px": [float(v) for v in view_rms_px],
         "covariance": rows,
+        "mark_rms_px": {n: float(v) for n, v in (mark_rms_px or {}).items()},
+        "marks": {n: [float(x) for x in p] for n, p in (marks or {}).items()},
     }
+    # What is not known has no place in the file.
+    document = {name: value for name, value in document.items() if value or value == 0}
     new = file.with_name(f".{file.name}.new")
     new.write_text(dumps(document, COMMENT), encoding="utf-8")
     try:

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct, field
 
 from legato.control.settings import CalibrationSettings, MassageSettings
+from legato.drivers.faulty.settings import FaultSettings
 from legato.drivers.sim.settings import SimSettings
 from legato.geometry.leg import PAPER_MARKS
 
@@ -75,6 +76,7 @@ class RobotTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         7072.0, 7072.0, 4158.0, 1536.0, 1536.0,
     )  # fmt: skip
     grip_steps_per_in: Rate = 371.0
+    grip_per_elbow: Annotated[float, Meta(ge=-10, le=10)] = 1.0
     shoulder_height_mm: Length = 193.675
     upper_arm_mm: Length = 177.8
     forearm_mm: Length = 177.8
@@ -104,6 +106,7 @@ class CameraTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     timeout_s: Seconds = 3.0
     max_age_s: Seconds = 1.0
     intrinsics: str | None = None
+    max_intrinsics_age_days: Annotated[float, Meta(gt=0, le=100_000)] = 730.0
     nominal_alpha_px: Annotated[float, Meta(gt=0, le=100_000)] = 650.0
 
 
@@ -146,7 +149,20 @@ class RecordsTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     state_dir: Annotated[str, Meta(pattern=r"\S")] = "~/.local/state/legato"
     keep_days: Annotated[int, Meta(ge=1, le=36_500)] = 90
+    keep_sessions: Annotated[int, Meta(ge=0, le=1_000_000)] = 20
     min_free_mb: Annotated[int, Meta(ge=0, le=10_000_000)] = 200
+
+
+class MetricsTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Where Prometheus may ask for the daemon's metrics; false is nowhere."""
+
+    listen: str | bool = False
+
+
+class SimTable(SimSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The simulated cell, and the faults that strike its drivers or any other."""
+
+    faults: Annotated[tuple[FaultSettings, ...], Meta(max_length=100)] = ()
 
 
 class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -160,4 +176,5 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     calibration: CalibrationSettings = CalibrationSettings()
     massage: MassageSettings = MassageSettings()
     records: RecordsTable = RecordsTable()
-    sim: SimSettings = SimSettings()
+    metrics: MetricsTable = MetricsTable()
+    sim: SimTable = SimTable()

@@ -6,12 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from legato.calibration.problem import GENES
+from legato.calibration.problem import GENES, Solution
 from legato.control.advice import Advice, advise
 from legato.control.checks import Check, picture_checks
 from legato.control.perceive import Calibration
 from legato.control.settings import CellSettings
 from legato.geometry.projection import project
+from legato.geometry.transforms import (
+    Array,
+    angles_from_rotation,
+    rotation_from_angles,
+    rotation_from_vector,
+)
 
 NOT_SEPARABLE = "f, s_x and s_y are not separately observable: only alpha_u and alpha_v are"
 
@@ -32,7 +38,7 @@ def document(
         "marks": {n: [m.u, m.v] for n, m in marks.items()},
         "missing": dict(calibration.picking.missing),
         "left_out": list(calibration.left_out),
-        "residuals": _residuals(calibration, settings),
+        "residuals": residuals_told(calibration, settings),
         "rms_px": solution.rms_px,
         "camera_from_object": solution.camera_from_object.tolist(),
         "world_from_object": calibration.world_from_object.tolist(),
@@ -81,7 +87,7 @@ def _shown(calibration: Calibration, settings: CellSettings) -> list[str]:
     return [n for n in settings.leg.names() if n in used]
 
 
-def _residuals(calibration: Calibration, settings: CellSettings) -> dict[str, list[float]]:
+def residuals_told(calibration: Calibration, settings: CellSettings) -> dict[str, list[float]]:
     """Return predicted minus seen in px, for the marks left out too."""
     names = _shown(calibration, settings)
     solution, marks = calibration.solution, calibration.picking.marks
@@ -106,6 +112,7 @@ def _parameters(calibration: Calibration) -> list[dict[str, Any]]:
     sigma |= dict(
         zip(("t_x", "t_y", "t_z"), np.sqrt(np.diag(solution.covariance)[7:]), strict=True)
     )
+    sigma |= dict(zip(("omega", "phi", "kappa"), _angle_sigmas(solution), strict=True))
     pose = GENES[5:]
     return [
         {
@@ -119,6 +126,21 @@ def _parameters(calibration: Calibration) -> list[dict[str, Any]]:
         }
         for gene, value in zip(GENES, solution.genes, strict=True)
     ]
+
+
+def _angle_sigmas(solution: Solution) -> Array:
+    """Return the standard deviations (3,) of omega, phi and kappa in rad.
+
+    The covariance is over small turns of the leg in the camera's frame; the angles' slopes along
+    them are taken by differences. They grow without bound where phi nears a right angle.
+    """
+    rotation, step = rotation_from_angles(solution.genes[8:11]), 1e-6
+    turned = rotation_from_vector(np.vstack([np.eye(3), -np.eye(3)]) * step) @ rotation
+    ahead, behind = np.split(angles_from_rotation(turned), 2)
+    wrapped = (ahead - behind + np.pi) % (2.0 * np.pi) - np.pi
+    slopes = wrapped.T / (2.0 * step)
+    spread = slopes @ solution.covariance[4:7, 4:7] @ slopes.T
+    return np.asarray(np.sqrt(np.maximum(np.diag(spread), 0.0)))
 
 
 def _stations(calibration: Calibration, settings: CellSettings) -> list[dict[str, Any]]:

@@ -5,10 +5,11 @@ that the fit was not asked, and answer in mm at the stations where they can.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from legato.calibration.camera import FREED, let_free
 from legato.calibration.cost import prepare
 from legato.calibration.problem import KnownIntrinsics, Problem, pose_of
 from legato.calibration.refine import refine
@@ -19,7 +20,6 @@ from legato.geometry.transforms import Array, apply
 from legato.vision.marks import FoundMark, Picking
 
 LEAST_SECOND = 5  # marks that two pictures must share; four give a pose that nothing tests
-OPEN_ALPHA, OPEN_CENTRE = 0.1, 60.0  # how far a camera let free may go: share, px
 OUTLIER = 4.0  # sigmas from the median beyond which one mark's size tells of that mark alone
 
 
@@ -59,24 +59,11 @@ def camera_doubt(calibration: Calibration) -> CameraDoubt | None:
     if problem.known is None or calibration.solution.engine == "paper":
         return None
     i = problem.known.intrinsics
-    open_ = np.diag(
-        [
-            (OPEN_ALPHA * i.alpha_u) ** 2,
-            (OPEN_ALPHA * i.alpha_v) ** 2,
-            OPEN_CENTRE**2,
-            OPEN_CENTRE**2,
-            0.0,
-            0.0,
-        ]
-    )
-    freed = replace(problem, known=KnownIntrinsics(i, open_))
-    model = prepare(freed)
-    better = refine(model, genes[None])
     before, _ = misfit(prepare(problem), genes)
-    after, _ = misfit(model, better.genes[0])
-    apart = _apart(pose_of(genes), pose_of(better.genes[0]), problem.stations)
-    alpha = float(np.sqrt(np.abs(np.prod(better.genes[0, 1:3] / [i.alpha_u, i.alpha_v]))))
-    return CameraDoubt(before - after, noise_limit(4), float(apart.max(initial=0.0)), alpha)
+    after, better = let_free(problem, genes)
+    apart = _apart(pose_of(genes), pose_of(better), problem.stations)
+    alpha = float(np.sqrt(np.abs(np.prod(better[1:3] / [i.alpha_u, i.alpha_v]))))
+    return CameraDoubt(before - after, noise_limit(FREED), float(apart.max(initial=0.0)), alpha)
 
 
 def moved(calibration: Calibration, second: Picking, pixel_sigma: float) -> Moved:

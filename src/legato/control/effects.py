@@ -44,9 +44,13 @@ class Grab:
 
 @dataclass(frozen=True)
 class Find:
-    """Find the marks in a picture; MarksNotFound counts as fault marks_not_found."""
+    """Find the marks in a picture, near a person's `picks` where there are some.
+
+    MarksNotFound counts as fault marks_not_found.
+    """
 
     frame: Frame
+    picks: Mapping[str, tuple[float, float]] | None = None
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,7 @@ class Solve:
     """Find the leg in a picture: its marks, then camera and pose."""
 
     frame: Frame
+    picks: Mapping[str, tuple[float, float]] | None = None
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from legato.hal.faults import Cause
 LONGEST_S = 0.2
 TIP_CLEARANCE = 3.0
 STATION_ALONG = 3.0
+ROUNDING = np.radians(0.2)  # how far whole half-steps may take a joint past its limit
 _SLACK = 1.001
 
 
@@ -34,19 +35,24 @@ def check(settings: CellSettings, world_from_object: Array | None, move: Move) -
         )
 
 
-def broken(settings: CellSettings, world_from_object: Array | None, move: Move) -> list[str]:
-    """Return what a motion command would break, a sentence each, empty where it is safe."""
+def broken(
+    settings: CellSettings, world_from_object: Array | None, move: Move, margin: float = 0.0
+) -> list[str]:
+    """Return what a motion command would break, a sentence each, empty where it is safe.
+
+    With a `margin` in mm it keeps so much farther off than it must.
+    """
     problems = _command(settings.arm, move)
     ends = np.array([move.start, move.target], dtype=float)
     joints, _ = joints_from_steps(settings.arm, np.vstack([ends[1], ends.mean(axis=0), ends[0]]))
-    problems += broken_limits(settings.arm, joints[0], tolerance=np.radians(0.2))
+    problems += broken_limits(settings.arm, joints[0], tolerance=ROUNDING)
     bones = skeleton(settings.arm, joints[:2])
-    problems += _box(settings, bones[0, 3])
-    problems += _table(settings, bones[:, 3])
-    problems += _shapes(settings, world_from_object, bones)
+    problems += _box(settings, bones[0, 3], margin)
+    problems += _table(settings, bones[:, 3], margin)
+    problems += _shapes(settings, world_from_object, bones, margin)
     if world_from_object is not None:
         tips = skeleton(settings.arm, joints)[:, 3]
-        problems += _tip(settings, world_from_object, tips, move)
+        problems += _tip(settings, world_from_object, tips, move, margin)
     return problems
 
 
@@ -62,21 +68,24 @@ def _command(model: ArmModel, move: Move) -> list[str]:
     return problems
 
 
-def _box(settings: CellSettings, tip: Array) -> list[str]:
+def _box(settings: CellSettings, tip: Array, margin: float) -> list[str]:
     space = settings.workspace
+    spare = f" mm, {margin:g} mm to spare" if margin else " mm"
     return [
-        f"fingertip {axis} {value:.1f} mm is outside the workspace {low:.0f} to {high:.0f} mm"
+        f"fingertip {axis} {value:.1f} mm is outside the workspace {low:.0f} to {high:.0f}{spare}"
         for axis, value, low, high in zip("xyz", tip, space.low, space.high, strict=True)
-        if not low <= value <= high
+        if not low + margin <= value <= high - margin
     ]
 
 
-def _table(settings: CellSettings, tips: Array) -> list[str]:
+def _table(settings: CellSettings, tips: Array, margin: float) -> list[str]:
     below = settings.workspace.table_z - float(np.min(tips[:, 2]))
-    return [f"fingertip would be {below:.1f} mm below the table"] if below > 0.0 else []
+    return [f"fingertip would be {below:.1f} mm below the table"] if below > -margin else []
 
 
-def _shapes(settings: CellSettings, world_from_object: Array | None, bones: Array) -> list[str]:
+def _shapes(
+    settings: CellSettings, world_from_object: Array | None, bones: Array, margin: float
+) -> list[str]:
     """Return which parts of the arm would meet the leg, the table or the arm's own base."""
     known = world_from_object is not None
     object_from_world = np.eye(4) if world_from_object is None else invert(world_from_object)
@@ -85,11 +94,13 @@ def _shapes(settings: CellSettings, world_from_object: Array | None, bones: Arra
         f"the {part} would meet the {obstacle} ({gap:.1f} mm)"
         for part, row in zip(PARTS, gaps.min(axis=0), strict=True)
         for obstacle, gap in zip(OBSTACLES, row, strict=True)
-        if gap < 0.0 and (known or obstacle != "leg")
+        if gap < margin and (known or obstacle != "leg")
     ]
 
 
-def _tip(settings: CellSettings, world_from_object: Array, tips: Array, move: Move) -> list[str]:
+def _tip(
+    settings: CellSettings, world_from_object: Array, tips: Array, move: Move, margin: float
+) -> list[str]:
     """Return whether the fingertip would touch the leg but at its station, or too deep there.
 
     `tips` are its places at the target, halfway, and at the start.
@@ -101,10 +112,10 @@ def _tip(settings: CellSettings, world_from_object: Array, tips: Array, move: Mo
         if gaps[2] < gaps[1] < gaps[0]:
             return []  # a pass that was broken off at the leg must be able to leave it
         near = f"fingertip would come within {-depth:.1f} mm of the leg"
-        return [near] if depth > -TIP_CLEARANCE else []
+        return [near] if depth > -TIP_CLEARANCE - margin else []
     problems = []
     massage = settings.massage
-    deepest = max(massage.press_mm, massage.draw.depth_mm)
+    deepest = max(massage.depths[-1], massage.draw.depth_mm)
     allowed = deepest + massage.contact_window_mm + 1.0
     if depth > allowed:
         problems.append(f"fingertip would be {depth:.1f} mm in the leg, {allowed:.1f} mm allowed")

@@ -24,7 +24,7 @@ from legato.control.massage import in_state, passes
 from legato.control.memory import Memory
 from legato.control.motion import Procedure, Track
 from legato.control.perceive import Calibration
-from legato.control.plan import transit
+from legato.control.plan import plan_stations, transit
 from legato.control.rehearsal import Way, problem
 from legato.control.settings import CellSettings
 from legato.control.states import CALIBRATE, CAPTURE, MOVE_HOME, STOPPING, VERIFY
@@ -122,7 +122,7 @@ def _capture(memory: Memory) -> Procedure:
 def _calibrate(settings: CellSettings, memory: Memory) -> Procedure:
     yield Enter(CALIBRATE)
     memory.calibration = memory.verified_at = None
-    calibration: Calibration = yield Solve(memory.frame)  # type: ignore[arg-type] # precondition
+    calibration: Calibration = yield Solve(memory.frame, memory.picks)  # type: ignore[arg-type] # precondition
     memory.calibration = calibration
     yield Save(CALIBRATION_FILE, document(calibration, settings))
 
@@ -133,7 +133,7 @@ def _verify(settings: CellSettings, memory: Memory, now: float) -> Procedure:
     memory.verified_at = None
     calibration = memory.calibration
     assert calibration is not None, "precondition of verify"
-    second = yield Find((yield Grab("verify")))
+    second = yield Find((yield Grab("verify")), memory.picks)
     checks: list[Check] = [
         *picture_checks(calibration, settings),
         second_picture_check(calibration, second, settings),
@@ -165,8 +165,22 @@ def _see_the_way(settings: CellSettings, memory: Memory, track: Track) -> None:
         raise Refused(Cause.LIMIT, (f"the way home is not clear: {found}",))
 
 
+def _see_the_way_on(settings: CellSettings, calibration: Calibration, track: Track) -> None:
+    """Raise Refused, before the first motion, where the way to the first station is not clear.
+
+    Verify has rehearsed it from home; the arm may stand elsewhere.
+    """
+    first = plan_stations(settings, calibration)[0]
+    way = Way((track.pose, *transit(settings, track.pose, first.lead_in)), Why.TRANSIT)
+    found = problem(settings, calibration.world_from_object, way)
+    if found:
+        where = f"the way to station {first.station:g} mm is not clear"
+        raise Refused(Cause.LIMIT, (f"{where}: {found}",))
+
+
 def _massage(settings: CellSettings, memory: Memory, track: Track) -> Procedure:
     assert memory.calibration is not None, "precondition of massage"
+    _see_the_way_on(settings, memory.calibration, track)
     try:
         yield from passes(Job(settings, memory.calibration, track))
     except CellFault:

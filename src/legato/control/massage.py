@@ -22,6 +22,7 @@ def in_state(track: Track, state: str, work: Callable[[], Procedure]) -> Procedu
             yield from track.retreat()
             yield Enter(PAUSED)
             yield Hold()
+            track.fresh = False
 
 
 def passes(job: Job) -> Procedure:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from legato.control.perceive import Calibration
+from legato.control.perceive import Calibration, Picks
 from legato.geometry.motion import Steps
 from legato.hal.camera import Frame
 
@@ -12,6 +12,7 @@ class Memory:
     """The cell's knowledge between jobs; None where nothing is known.
 
     `reference` is the absolute steps (geometry.arm) at which the registers read zero.
+    `picks` are the marks that a person named for the leg as it lies.
     """
 
     reference: Steps | None = None
@@ -19,6 +20,7 @@ class Memory:
     frame: Frame | None = None
     calibration: Calibration | None = None
     verified_at: float | None = None
+    picks: Picks | None = None
 
     def steps(self) -> Steps | None:
         """Return where the arm stands in absolute steps, if that is known."""

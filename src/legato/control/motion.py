@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from legato.control.effects import CellFault, Effect, Move, ReadArm, Why
+from legato.control.envelope import ROUNDING
 from legato.control.memory import Memory
 from legato.control.plan import pose_at, transit
 from legato.control.settings import CellSettings
@@ -26,7 +27,8 @@ class Track:
     """Where the arm stands in absolute steps, by its own registers, and the pose to retreat to.
 
     `lift` gives the pose to retreat to from where the fingertip is at the leg; None while it is
-    not. `touching` are the stations between which it may touch.
+    not. `touching` are the stations between which it may touch. `fresh` says whether the last
+    reading is of this moment: a motion has just ended with it.
     """
 
     def __init__(self, settings: CellSettings, memory: Memory) -> None:
@@ -35,6 +37,7 @@ class Track:
         self.lift: Lift | None = None
         self.touching: tuple[float, float | None] | None = None
         self.contact = False
+        self.fresh = False
 
     @property
     def steps(self) -> Steps:
@@ -55,18 +58,25 @@ class Track:
         """Read registers and switch."""
         self._take((yield ReadArm()))
 
+    def look(self) -> Procedure:
+        """Read registers and switch where the last motion's own reading does not tell them."""
+        if not self.fresh:
+            yield from self.read()
+
     def to(self, goal: ToolPose, why: Why, speed: float | None = None) -> Procedure:
         """Move in a straight line to a pose, at most at `speed` mm/s; descents end on contact."""
         here, scale = self.pose, self._settings.speed_scale
         length = float(np.linalg.norm(goal.xyz - here.xyz))
         pieces = 1 if speed is None else max(1, int(np.ceil(length / (speed * PIECE_S))))
         try:
-            path = straight_path(self._settings.arm, here, goal, scale=scale, pieces=pieces)
+            path = straight_path(
+                self._settings.arm, here, goal, scale=scale, pieces=pieces, tolerance=ROUNDING
+            )
         except Unreachable as error:
             raise CellFault(
                 Cause.LIMIT, f"the way is out of reach: {error}", "move the leg into reach"
             ) from error
-        for target in rounded(path):
+        for target in rounded(path, self._settings.arm.grip_per_elbow):
             start = self.steps
             if start == target:
                 continue
@@ -91,3 +101,4 @@ class Track:
     def _take(self, reading: ArmReading) -> None:
         self._memory.registers = reading.registers
         self.contact = reading.contact
+        self.fresh = True

@@ -22,6 +22,8 @@ from legato.vision.marks import MarksNotFound, Picking
 
 Picks = Mapping[str, tuple[float, float]]
 
+DAY_S = 86_400.0
+CLOCKS_DIFFER_DAYS = 1.0  # two clocks and their zones may differ by so much
 LENS_ROUNDS = 5
 LENS_CLOSE = 1e-3  # px
 
@@ -47,10 +49,12 @@ class Calibration:
     normals: Array
 
 
-def find_marks_in(image: Image, settings: CellSettings, *, seed: int) -> Picking:
+def find_marks_in(
+    image: Image, settings: CellSettings, *, seed: int, picks: Picks | None = None
+) -> Picking:
     """Return the marks of a picture; raises CellFault(marks_not_found)."""
     try:
-        return pick_marks(image, settings, seed=seed)
+        return pick_marks(image, settings, seed=seed, picks=picks)
     except MarksNotFound as error:
         evidence = {"candidates": error.candidates}
         raise CellFault(Cause.MARKS_NOT_FOUND, error.text, error.hint, evidence) from error
@@ -127,10 +131,43 @@ def _solved(problem: Problem, settings: CellSettings, rng: np.random.Generator) 
     return replace(found, solution=replace(found.solution, intrinsics=camera))
 
 
-def perceive(image: Image, settings: CellSettings, *, seed: int) -> Calibration:
-    """Do what `find_leg` does, with its errors as the cell's: a fault, or a refusal."""
+def refuse_outdated(settings: CellSettings, now_s: float) -> None:
+    """Raise CalibrationError where the known intrinsics are older than the cell lets them be.
+
+    `now_s` is the time of day in s since 1970.
+    """
+    if settings.camera_dated_s is None:
+        return
+    days = (now_s - settings.camera_dated_s) / DAY_S
+    if days < -CLOCKS_DIFFER_DAYS:
+        text = f"the intrinsics file is dated {-days:.0f} days from now"
+        raise CalibrationError(text, "set this machine's clock, or calibrate the camera anew")
+    if days > settings.camera_days:
+        text = (
+            f"the intrinsics file is {days:.0f} days old, {settings.camera_days:g} are allowed "
+            "(camera.max_intrinsics_age_days)"
+        )
+        hint = "calibrate the camera anew (legato intrinsics): mounts creep and lenses are touched"
+        raise CalibrationError(text, hint)
+
+
+def perceive(
+    image: Image,
+    settings: CellSettings,
+    *,
+    seed: int,
+    picks: Picks | None = None,
+    now_s: float | None = None,
+) -> Calibration:
+    """Do what `find_leg` does, with its errors as the cell's: a fault, or a refusal.
+
+    Where the time of day is given the known intrinsics must not be older than they may be.
+    """
     try:
-        return solve_marks(find_marks_in(image, settings, seed=seed), settings, seed=seed)
+        if now_s is not None:
+            refuse_outdated(settings, now_s)
+        picking = find_marks_in(image, settings, seed=seed, picks=picks)
+        return solve_marks(picking, settings, seed=seed)
     except CalibrationError as error:
         raise Refused(Cause.CALIBRATION_REJECTED, (str(error),)) from error
 

@@ -45,11 +45,20 @@ def plan_stations(settings: CellSettings, calibration: Calibration) -> list[Stat
     heading = calibration.world_from_object[:2, 0]
     yaw = float(np.arctan2(heading[1], heading[0]))
     places = zip(settings.stations, calibration.stations, calibration.normals, strict=True)
-    return [_plan(settings, station, p, normal, yaw) for station, p, normal in places]
+    plans: list[StationPlan] = []
+    for station, place, normal in places:
+        before = plans[-1].approach.roll if plans else None
+        plans.append(_plan(settings, station, place, normal, yaw, before))
+    return plans
 
 
 def _plan(
-    settings: CellSettings, station: float, surface: Array, normal: Array, yaw: float
+    settings: CellSettings,
+    station: float,
+    surface: Array,
+    normal: Array,
+    yaw: float,
+    before: float | None,
 ) -> StationPlan:
     base = float(np.arctan2(surface[1], surface[0]))
     sideways = np.array([-np.sin(base), np.cos(base), 0.0])
@@ -57,6 +66,8 @@ def _plan(
     up = up / np.linalg.norm(up)
     x, y, z = surface + settings.approach * up
     roll = finger_roll(base, yaw)
+    if before is not None:  # the hand never turns the long way round from station to station
+        roll += 2.0 * np.pi * round((before - roll) / (2.0 * np.pi))
     pitch = -np.pi / 2
     if settings.massage.follow_normal:
         pitch = _leaning(up, base)

@@ -70,8 +70,9 @@ class CalibrationSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_on
     max_mark_size_percent: Positive = 0.3
     """How far the marks' mean size may be off: 0.4 % stands for 1 mm at the farthest station. A leg
     of another size with marks of the right one is told by this alone; 1000 never refuses."""
-    leg_rests_mm: Range = (-4.0, 30.0)
-    """How high over the table the leg's lowest point may lie; -1000 to 1000 never refuses."""
+    leg_rests_mm: Range = (-4.0, 8.0)
+    """How high over the table the leg's lowest point may lie; -1000 to 1000 never refuses. A leg of
+    another size with marks of that size too is told by this alone."""
     allow_on_bound: bool = False
     fresh_s: Annotated[float, Meta(gt=0, le=604_800)] = 3600.0
     """A verified calibration older than this is not used for a massage."""
@@ -92,6 +93,9 @@ class MassageSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     strokes: Annotated[int, Meta(ge=1, le=100)] = 3
     press_mm: Annotated[float, Meta(ge=0, le=5)] = 1.5
+    press_steps: Annotated[int, Meta(ge=0, le=50)] = 0
+    """Guarded steps beyond contact, each looked at like those before it; 0 presses `press_mm`."""
+    press_speed_mm_s: Annotated[float, Meta(gt=0, le=100)] = 50.0
     dwell_s: Seconds = 1.0
     contact_window_mm: Annotated[float, Meta(gt=0, le=8)] = 2.0
     """How far above or below the predicted surface the switch may close."""
@@ -103,6 +107,13 @@ class MassageSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     follow_normal: bool = False
     """Lean the hand along the surface normal, as far as its pitch allows, instead of -90 deg."""
     draw: DrawSettings = DrawSettings()
+
+    @property
+    def depths(self) -> tuple[float, ...]:
+        """How far beyond contact the press goes, motion by motion, mm."""
+        if self.press_steps:
+            return tuple((k + 1) * self.descent_mm for k in range(self.press_steps))
+        return (self.press_mm,)
 
 
 @dataclass(frozen=True)
@@ -135,3 +146,7 @@ class CellSettings:
     engine: EngineSettings
     massage: MassageSettings
     simulated: bool
+    camera_dated_s: float | None = None
+    """When the known intrinsics were made, s since 1970; None where there are none."""
+    camera_days: float = float("inf")
+    """How many days they hold."""

@@ -38,8 +38,9 @@ class Job:
 def press(job: Job, plan: StationPlan, stroke: int, done: int) -> Procedure:
     """Press at one station."""
     massage = job.settings.massage
-    height = yield from _touch(job, plan, stroke, done, "stroke")
-    yield from job.track.to(plan.at(height - massage.press_mm), Why.PRESS)
+    height = yield from _touch(job, plan, stroke, done, "press")
+    for depth in massage.depths:
+        yield from job.track.to(plan.at(height - depth), Why.PRESS, massage.press_speed_mm_s)
     yield Dwell(massage.dwell_s)
     yield from job.track.retreat()
 
@@ -48,7 +49,8 @@ def draw(job: Job, plan: StationPlan, onward: StationPlan, stroke: int, done: in
     """Press at one station and draw along the leg's surface to the next."""
     settings = job.settings.massage.draw
     height = yield from _touch(job, plan, stroke, done, "draw")
-    yield from job.track.to(plan.at(height - settings.depth_mm), Why.PRESS)
+    deep = plan.at(height - settings.depth_mm)
+    yield from job.track.to(deep, Why.PRESS, job.settings.massage.press_speed_mm_s)
     job.track.touching = (plan.station, onward.station)
     job.track.lift = partial(_lifted, plan, onward, job.settings.approach)
     # The surface is straight between two stations, and as far from its prediction as it was here.
@@ -71,14 +73,15 @@ def _touch(job: Job, plan: StationPlan, stroke: int, done: int, kind: str) -> Pr
     track = job.track
     if np.linalg.norm(track.pose.xyz - plan.approach.xyz) > 0.5:
         yield from track.to(plan.approach, Why.APPROACH)
-    where = {"station_mm": plan.station, "stroke": stroke, "done": done, "total": job.total}
-    yield Record("progress", {"text": f"{kind} {stroke} at {plan.station:g} mm", **where})
-    yield from track.read()
+    what = {"station_mm": plan.station, "stroke": stroke, "kind": kind}
+    text = f"{kind} {stroke} at {plan.station:g} mm"
+    yield Record("progress", {"text": text, **what, "done": done, "total": job.total})
+    yield from track.look()
     if track.contact:
         raise _early(plan, job.settings.approach, "before the descent")
     track.lift, track.touching = (lambda _: plan.approach), (plan.station, None)
     height = yield from _descend(job, plan)
-    yield Record("contact", _contact(job, plan, stroke, height))
+    yield Record("contact", what | _contact(job, plan, height))
     drift = height - job.first.setdefault(plan.station, height)
     if abs(drift) > job.settings.massage.drift_mm:
         yield from track.retreat()
@@ -108,14 +111,12 @@ def _descend(job: Job, plan: StationPlan) -> Procedure:
     return touched
 
 
-def _contact(job: Job, plan: StationPlan, stroke: int, height: float) -> dict[str, Any]:
+def _contact(job: Job, plan: StationPlan, height: float) -> dict[str, Any]:
     """Return the contact event: height over the prediction, place along and across the leg."""
     touch = plan.surface + height * plan.up
     tip = job.track.pose.xyz + (height - plan.height(job.track.pose.xyz)) * plan.up
     along, across, _ = apply(invert(job.calibration.world_from_object), tip[None])[0]
     return {
-        "station_mm": plan.station,
-        "stroke": stroke,
         "contact_mm": round(height, 3),
         "place_mm": round(float(along), 3),
         "across_mm": round(float(across), 3),

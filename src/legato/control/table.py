@@ -7,11 +7,16 @@ from typing import Final
 from legato.control.states import FAULT, IDLE, MOVE_HOME, PAUSED, STOPPING, states
 
 JOBS: Final = ("run", "capture", "calibrate", "verify", "home", "massage")
-READERS: Final = ("ping", "status", "describe", "wait", "sessions", "session", "events_since")
-ALWAYS: Final = (*READERS, "estop", "shutdown", "lease")
-METHODS: Final = (*ALWAYS, *JOBS, "pause", "resume", "stop", "reset", "reference")
+CAMPAIGN: Final = "campaign"
+READERS: Final = (
+    "ping", "status", "describe", "wait", "sessions", "session", "events_since", "campaigns",
+)  # fmt: skip
+ALWAYS: Final = (*READERS, "estop", "shutdown", "lease", "end_campaign")
+METHODS: Final = (*ALWAYS, *JOBS, CAMPAIGN, "pause", "resume", "stop", "reset", "reference")
 STOPS: Final = ("stop", "estop")
-ACTING: Final = (*JOBS, "pause", "resume", "reset", "reference", "shutdown")
+ACTING: Final = (
+    *JOBS, CAMPAIGN, "end_campaign", "pause", "resume", "reset", "reference", "shutdown",
+)  # fmt: skip
 """What a lease keeps for its holder; nobody ever needs one to stop."""
 
 OPERATOR: Final = "operator"
@@ -50,7 +55,7 @@ def admit(method: str, state: str) -> Refusal | None:
     if state == FAULT:
         hint = "read the fault in status, clear its cause, then send reset"
         return Refusal(IN_FAULT, f"{method} is not possible in fault", hint)
-    if method in (*JOBS, "reference"):
+    if method in (*JOBS, CAMPAIGN, "reference"):
         return None if state == IDLE else _busy(method, state)
     if method == "pause":
         return None if pausable(state) else _unfit(method, state, "only motion can be paused")

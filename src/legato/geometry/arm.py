@@ -43,6 +43,7 @@ class ArmModel:
     hand: float = 96.52
     steps_per_rev: tuple[float, float, float, float, float] = (7072, 7072, 4158, 1536, 1536)
     grip_steps_per_mm: float = 371 / INCH
+    grip_per_elbow: float = 1.0  # half-steps of motor 6 for one of motor 3 that hold the gripper
     roll_sign: int = 1
     rates: tuple[float, ...] = (473.0, 405.0, 543.0, 494.0, 494.0, 292.0)
     limits: ArmLimits = field(default_factory=ArmLimits)
@@ -100,12 +101,16 @@ def backward(model: ArmModel, xyz: ArrayLike, pitch: ArrayLike, roll: ArrayLike)
 
 
 def broken_limits(model: ArmModel, joints: ArrayLike, tolerance: float = 1e-9) -> list[str]:
-    """Return, for one joint vector (5,), a sentence for each range it breaks."""
+    """Return, for one joint vector (5,), a sentence for each range it breaks.
+
+    It may pass each end by `tolerance` rad; below 0 it has to keep so far off.
+    """
     t1, t2, t3, pitch, roll = (float(v) for v in np.asarray(joints, dtype=float))
     if not np.isfinite([t1, t2, t3, pitch, roll]).all():
         return ["out of reach"]
     lim = model.limits
     found = []
+    spare = f", {-np.degrees(tolerance):.1f} deg to spare" if tolerance < 0.0 else ""
     for name, value, (low, high) in (
         ("base", t1, lim.base),
         ("shoulder", t2, lim.shoulder),
@@ -116,7 +121,7 @@ def broken_limits(model: ArmModel, joints: ArrayLike, tolerance: float = 1e-9) -
         if not low - tolerance <= value <= high + tolerance:
             found.append(
                 f"{name} {np.degrees(value):.1f} deg is outside "
-                f"{np.degrees(low):.0f} to {np.degrees(high):.0f} deg"
+                f"{np.degrees(low):.0f} to {np.degrees(high):.0f} deg{spare}"
             )
     return found + _body_conflicts(model, t1, t2, t3, pitch)
 
@@ -150,7 +155,8 @@ def reach(model: ArmModel, xyz: ArrayLike, pitch: float, roll: float) -> Array:
 def steps_from_joints(model: ArmModel, joints: ArrayLike, grip: ArrayLike = 0.0) -> Array:
     """Return steps (..., 6), not rounded, of joints (..., 5) and a gripper opening in mm.
 
-    Motor 6 follows motor 3 one to one, or the cable would open and close the gripper.
+    Motor 6 follows motor 3 (one to one in the manual), or its cable would open and close the
+    gripper.
     """
     j = np.asarray(joints, dtype=float)
     k = model.steps_per_rad
@@ -162,7 +168,7 @@ def steps_from_joints(model: ArmModel, joints: ArrayLike, grip: ArrayLike = 0.0)
         s3,
         -k[3] * (pitch - roll),
         -k[4] * (pitch + roll),
-        s3 + model.grip_steps_per_mm * np.asarray(grip, dtype=float),
+        model.grip_per_elbow * s3 + model.grip_steps_per_mm * np.asarray(grip, dtype=float),
     ]
     return np.stack(np.broadcast_arrays(*columns), axis=-1)
 
@@ -182,4 +188,4 @@ def joints_from_steps(model: ArmModel, steps: ArrayLike) -> tuple[Array, Array]:
         ],
         axis=-1,
     )
-    return joints, (s[..., 5] - s[..., 2]) / model.grip_steps_per_mm
+    return joints, (s[..., 5] - model.grip_per_elbow * s[..., 2]) / model.grip_steps_per_mm

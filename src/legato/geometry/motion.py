@@ -5,7 +5,7 @@ together. The rate of the longest-moving motor is 10152 / (255 - speed) half-ste
 inferred from one calibration point), the others scale with it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ from legato.geometry.transforms import Array
 RATE_CONSTANT = 10152.0
 SPEED_ZERO = 255
 SPEEDS = (0, 245)
+SAMPLES = 64  # of a line that is cut where equal times end
 
 Steps = tuple[int, int, int, int, int, int]
 
@@ -111,39 +112,65 @@ def straight_path(
     start: ToolPose,
     end: ToolPose,
     *,
-    chord: float = 0.25,
+    chord: float = 0.24,
     longest: float = 0.19,
     scale: float = 1.0,
     pieces: int = 1,
+    tolerance: float = 1e-9,
 ) -> Array:
     """Return waypoints (N, 6) in steps, not rounded, after `start` up to and with `end`.
 
-    There are at least `pieces` of them. The fingertip keeps to the straight line within `chord` mm,
-    and each piece lasts at most `longest` s at `scale` of the motors' rates; the robot's whole
-    speed numbers make that up to 5 % more. Raises Unreachable, naming the place, where a waypoint
-    is out of reach or breaks a joint's limit.
+    There are at least `pieces` of them, then of equal length. The fingertip keeps to the straight
+    line within `chord` mm (0.01 under what is promised: rounding to half-steps takes some), and
+    each piece lasts at most `longest` s at `scale` of the motors' rates; the robot's whole speed
+    numbers make that up to 5 % more. Raises Unreachable, naming the place, where a waypoint is out
+    of reach or breaks a joint's limit by more than `tolerance` rad.
     """
     a, b = start.vector(), end.vector()
     if np.array_equal(a, b):
         return np.empty((0, 6))
-    count = pieces
+    rates, count = np.asarray(model.rates) * scale, pieces
+    paces: list[Callable[[int], Array]] = [_even]
     while True:
-        poses = a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a)
-        steps = pose_steps(model, poses)
-        _refuse_unreachable(model, poses)
-        piece = np.abs(np.diff(steps, axis=0)) + 1.0
-        time = float((piece / (np.asarray(model.rates) * scale)).max())
-        bend = _chord_error(model, poses, steps)
-        if time <= longest and bend <= chord:
-            return steps[1:]
-        count = max(count + 1, int(np.ceil(count * max(time / longest, np.sqrt(bend / chord)))))
+        excess = np.inf
+        for pace in paces:
+            poses = a + pace(count)[:, None] * (b - a)
+            steps = pose_steps(model, poses)
+            _refuse_unreachable(model, poses, tolerance)
+            time = float(((np.abs(np.diff(steps, axis=0)) + 1.0) / rates).max())
+            over = max(time / longest, np.sqrt(_chord_error(model, poses, steps) / chord))
+            if over <= 1.0:
+                return steps[1:]
+            excess = min(excess, over)
+        if pieces == 1 and len(paces) == 1:  # one piece does for most moves; they need no more
+            paces.append(_equal_times(model, a, b, rates))
+        count = max(count + 1, int(count * excess))
 
 
-def _refuse_unreachable(model: ArmModel, poses: Array) -> None:
+def _even(count: int) -> Array:
+    """Return the fractions (count + 1,) of a line at which equal lengths begin and end."""
+    return np.linspace(0.0, 1.0, count + 1)
+
+
+def _equal_times(model: ArmModel, a: Array, b: Array, rates: Array) -> Callable[[int], Array]:
+    """Return what cuts the line from `a` to `b` where equal times at the motors' rates end.
+
+    Where time decides, fewer commands do than in equal lengths: none is short because another,
+    where the joints turn faster, is as long as it may be. Where the chord decides, more may.
+    """
+    fine = _even(SAMPLES)
+    steps = pose_steps(model, a + fine[:, None] * (b - a))
+    spent = np.cumsum((np.abs(np.diff(steps, axis=0)) / rates).max(axis=1))
+    if not np.isfinite(spent).all() or spent[-1] <= 0.0:
+        return _even
+    return lambda count: np.interp(_even(count) * spent[-1], np.append(0.0, spent), fine)
+
+
+def _refuse_unreachable(model: ArmModel, poses: Array, tolerance: float) -> None:
     """Raise Unreachable for the first pose (N, 6) that the arm cannot take."""
     joints = backward(model, poses[:, :3], poses[:, 3], poses[:, 4])
     for pose, joint in zip(poses, joints, strict=True):
-        broken = broken_limits(model, joint)
+        broken = broken_limits(model, joint, tolerance)
         if broken:
             place = ", ".join(f"{v:.1f}" for v in pose[:3])
             raise Unreachable(f"({place}) mm: {broken[0]}")
@@ -156,11 +183,13 @@ def _chord_error(model: ArmModel, poses: Array, steps: Array) -> float:
     return float(np.linalg.norm(place - (poses[1:, :3] + poses[:-1, :3]) / 2.0, axis=-1).max())
 
 
-def rounded(waypoints: Array) -> Iterator[Steps]:
+def rounded(waypoints: Array, grip_per_elbow: float = 1.0) -> Iterator[Steps]:
     """Yield each waypoint (6,) in whole steps, the gripper's motor rounded with the elbow's.
 
-    Rounding absolute targets carries the remainder: it never adds up along a path.
+    `grip_per_elbow` is the arm model's: how far motor 6 has to follow motor 3. Rounding absolute
+    targets carries the remainder: it never adds up along a path.
     """
     for w in waypoints:
         one, two, three, four, five = (round(float(v)) for v in w[:5])
-        yield one, two, three, four, five, three + round(float(w[5] - w[2]))
+        follows = grip_per_elbow * (three - float(w[2]))
+        yield one, two, three, four, five, round(float(w[5]) + follows)

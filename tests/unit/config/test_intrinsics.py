@@ -1,6 +1,7 @@
 """The intrinsics file: what is written reads back; what cannot be a camera is refused."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +23,23 @@ def test_what_is_written_reads_back(tmp_path: Path) -> None:
     assert np.array_equal(found.known().covariance, camera.covariance)
     assert (found.views, found.rms_px, found.created) == (12, 0.11, "2026-11-20")
     assert [p.name for p in tmp_path.iterdir()] == ["lens.toml"]
+
+
+def test_residuals_and_places_of_marks_read_back(tmp_path: Path) -> None:
+    """What was found by view and by mark stands in the file; a file without it is as good."""
+    file = tmp_path / "lens.toml"
+    given: dict[str, Any] = {"views": 2, "rms_px": 0.11, "created": "2026-11-20"}
+    plain = write_intrinsics(file, known(), **given)
+    assert (plain.view_rms_px, plain.mark_rms_px, plain.marks) == ((), {}, {})
+    more: dict[str, Any] = {
+        "view_rms_px": [0.1, 0.12],
+        "mark_rms_px": {"P1": 0.0},
+        "marks": {"P1": [0, 0.1, 25]},
+    }
+    write_intrinsics(file, known(), **given, **more)
+    found = read_intrinsics(file)
+    assert (found.view_rms_px, found.mark_rms_px) == ((0.1, 0.12), {"P1": 0.0})
+    assert found.marks == {"P1": (0.0, 0.1, 25.0)}
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,22 @@ BAD: list[tuple[str, str, str, str]] = [
         "text in quotes or a whole",
     ),
     ("robot = 3\n" + SIM, "robot", "3", "a table"),
+    # Faults: a kind that there is, one beginning, a call of the device.
+    (SIM + "[[sim.faults]]\nkind = 'fire'\ncall = 1\n", "sim.faults[0].kind", "'fire'", "arm_lost"),
+    (SIM + "[[sim.faults]]\nkind = 'blank'\n", "sim.faults[0]", "", "one of at_s, call and p"),
+    (
+        SIM + "[[sim.faults]]\nkind = 'blank'\ncall = 1\np = 0.5\n",
+        "sim.faults[0].p",
+        "0.5",
+        "one of at_s, call and p",
+    ),
+    (
+        SIM + "[[sim.faults]]\nkind = 'blank'\ncall = 1\non = 'step'\n",
+        "sim.faults[0].on",
+        "step",
+        "grab",
+    ),
+    (SIM + "[[sim.faults]]\nkind = 'blank'\np = 1.5\n", "sim.faults[0].p", "1.5", "at most 1"),
     # Out of range.
     (SIM + "[robot]\nspeed_scale = 3.0\n", "robot.speed_scale", "3.0", "at most 1"),
     (SIM + "[robot]\nbaud = 9601\n", "robot.baud", "9601", "9600"),
@@ -64,6 +80,7 @@ BAD: list[tuple[str, str, str, str]] = [
     (SIM + "[massage]\ndwell_s = 60.1\n", "massage.dwell_s", "60.1", "at most 60"),
     (SIM + "[massage.draw]\ndwell_s = 61\n", "massage.draw.dwell_s", "61", "at most 60"),
     (SIM + "[massage.draw]\ncount = 101\n", "massage.draw.count", "101", "at most 100"),
+    (SIM + "[massage]\npress_steps = 11\n", "massage.press_steps", "11", "10 steps at most"),
     (SIM + "[calibration]\npopulation = 10001\n", "calibration.population", "1", "most 10000"),
     (SIM + "[calibration]\ngenerations = 100001\n", "calibration.generations", "1", "100000"),
     (SIM + "[calibration]\nfresh_s = 604801\n", "calibration.fresh_s", "604801", "at most 604800"),

@@ -59,3 +59,23 @@ def test_key_files_are_relative_to_the_configuration(write: Write) -> None:
 def test_a_client_beside_the_daemon_finds_it(listens: str, found: str) -> None:
     """A daemon that listens everywhere is found on loopback."""
     assert reachable(listens) == found
+
+
+@pytest.mark.parametrize("listen", ["127.0.0.1:9108", "127.9.9.9:0", "[::1]:9108", "localhost:1"])
+def test_metrics_listen_on_loopback(write: Write, listen: str) -> None:
+    """By address or by name, at a port or at a free one; nowhere unless told."""
+    assert load(write(SIM)).config.metrics.listen is False
+    assert load(write(SIM + "[metrics]\nlisten = false\n")).config.metrics.listen is False
+    found = load(write(SIM + f"[metrics]\nlisten = '{listen}'\n")).config.metrics.listen
+    assert found == listen
+
+
+@pytest.mark.parametrize(
+    "listen",
+    ["true", "'0.0.0.0:9108'", "'192.0.2.1:9108'", "'[::]:9108'", "'cell.lab:9108'", "':9108'",
+     "'9108'", "'127.0.0.1:70000'", "'127.0.0.1'", "'tcp://127.0.0.1:9108'", "9108"],
+)  # fmt: skip
+def test_metrics_never_listen_beyond_loopback(write: Write, listen: str) -> None:
+    """Neither an address nor a name beyond it, and nothing that is no address at all."""
+    with pytest.raises(ConfigError, match=r"metrics\.listen"):
+        load(write(SIM + f"[metrics]\nlisten = {listen}\n"))

@@ -9,6 +9,7 @@ from legato.control import effects as do
 from legato.control.jobs import precondition
 from legato.control.memory import Memory
 from legato.control.settings import Workspace
+from legato.geometry.motion import ToolPose
 from legato.geometry.transforms import rotation_from_vector, transform
 from tests.unit.control.cell import HOME, STATIONS, Bench, cell_settings, steps_at
 
@@ -178,3 +179,17 @@ def test_each_job_says_what_it_lacks(bench: Maker) -> None:
     late = precondition("massage", settings, full, settings.calibration.fresh_s + 1.0)
     assert late is not None
     assert "old" in late.reason
+
+
+def test_a_massage_whose_way_to_the_leg_is_not_clear_is_refused_before_it_moves(
+    bench: Maker,
+) -> None:
+    """Verify rehearses from home; an arm that stands beside the leg may not cut through it."""
+    cell = bench()
+    calibration = cell.memory.calibration
+    assert calibration is not None
+    beside = ToolPose(88.0, -20.0, 62.0, pitch=-0.6)
+    cell.memory.reference = steps_at(cell.settings, beside)
+    with pytest.raises(do.Refused, match="the way to station 7 mm is not clear"):
+        cell.run("massage")
+    assert cell.moves() == []

@@ -1,17 +1,31 @@
 """Stations, lead-ins and the roll of the fingers."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from legato.control.perceive import Calibration
 from legato.control.plan import finger_roll, plan_stations, transit
+from legato.drivers.sim.settings import SimSettings
+from legato.drivers.sim.world import drawn_pose
 from legato.geometry.arm import backward
 from legato.geometry.motion import ToolPose
-from tests.unit.control.cell import HOME, Bench, cell_settings
+from legato.geometry.transforms import Array, apply, rotation_from_vector, transform
+from tests.unit.control.cell import HOME, Bench, calibration_of, cell_settings
 
 angles = st.floats(-np.pi, np.pi)
+SETTINGS = cell_settings()
+FOUND = calibration_of(SETTINGS, drawn_pose(SimSettings(), np.random.default_rng(0)))
+
+
+def stated(pose: Array) -> Calibration:
+    """Return a calibration that states another pose."""
+    places = SETTINGS.leg.surface_point(np.array(SETTINGS.stations))
+    normals = np.tile(pose[:3, :3] @ SETTINGS.leg.surface_normal(), (len(places), 1))
+    return replace(FOUND, world_from_object=pose, stations=apply(pose, places), normals=normals)
 
 
 @given(base=st.floats(-1.5, 1.5), yaw=angles)
@@ -62,3 +76,15 @@ def test_transit_goes_up_first_and_down_last() -> None:
     assert transit(settings, goal, goal)[-1] == goal
     assert transit(settings, HOME, HOME) == []
     assert np.isfinite(backward(settings.arm, way[1].xyz, way[1].pitch, way[1].roll)).all()
+
+
+@settings(deadline=None)
+@given(yaw=angles)
+def test_the_hand_never_turns_the_long_way_round_between_stations(yaw: float) -> None:
+    """Whatever the leg's heading, rolls of successive stations are near, and align the fingers."""
+    pose = transform(rotation_from_vector([0.0, 0.0, yaw]), [180.0, 0.0, 40.0])
+    plans = plan_stations(SETTINGS, stated(pose))
+    rolls = np.array([p.approach.roll for p in plans])
+    assert np.abs(np.diff(rolls)).max() <= np.pi
+    base = [np.arctan2(p.approach.y, p.approach.x) for p in plans]
+    assert np.allclose(np.cos(np.array(base) + np.pi / 2 - rolls - yaw), 1.0)

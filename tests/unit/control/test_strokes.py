@@ -31,6 +31,19 @@ def test_a_draw_stays_in_touch_from_station_to_station(bench: Maker) -> None:
     assert all(0.5 < t["depth_mm"] < 3.0 for t in touches)
 
 
+@pytest.mark.parametrize("settings", [{"press_mm": 1.5}, {"press_steps": 3, "press_mm": 4.0}])
+def test_a_press_goes_to_a_depth_or_a_count_of_steps(bench: Maker, settings: Any) -> None:
+    """Three steps of half a millimetre beyond contact end where a press of 1.5 mm ends."""
+    cell = bench(massage=MassageSettings(strokes=1, **settings))
+    assert cell.run("massage") == "done"
+    assert cell.world.testimony()["breaches"] == []
+    depths = [t["depth_mm"] for t in cell.touches()]
+    assert len(depths) == 4
+    assert all(1.1 < depth < 1.9 for depth in depths)
+    presses = [m for m in cell.moves() if m.why is do.Why.PRESS]
+    assert len(presses) == 4 * settings.get("press_steps", 1)
+
+
 def test_a_draw_keeps_to_its_speed(bench: Maker) -> None:
     """The fingertip goes along the leg at most as fast as configured."""
     cell = bench(massage=drawing())

@@ -42,6 +42,8 @@ def test_reading_and_estop_are_never_refused(state: str) -> None:
     ("method", "where"),
     [
         *((job, {"idle"}) for job in JOBS),
+        ("campaign", {"idle"}),
+        ("end_campaign", set(ALL)),
         ("reference", {"idle"}),
         ("reset", {"fault"}),
         ("resume", {"paused"}),

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from legato.calibration.problem import CalibrationError, KnownIntrinsics
+from legato.calibration.problem import GENES, CalibrationError, KnownIntrinsics
 from legato.control.advice import advise, advise_marks
 from legato.control.checks import Check, picture_checks, second_picture_check
 from legato.control.document import document
@@ -19,7 +19,13 @@ from legato.control.verify import cell_checks, lowest_point
 from legato.drivers.sim.settings import SimSettings
 from legato.drivers.sim.world import drawn_pose
 from legato.geometry.projection import Intrinsics
-from legato.geometry.transforms import Array, rotation_from_vector, transform
+from legato.geometry.transforms import (
+    Array,
+    angles_from_rotation,
+    rotation_from_angles,
+    rotation_from_vector,
+    transform,
+)
 from legato.vision.marks import FoundMark, Picking
 from tests.unit.control.cell import cell_settings, picking_of
 
@@ -90,6 +96,24 @@ def test_the_papers_pose_rests_on_the_table() -> None:
     pose = drawn_pose(still, np.random.default_rng(0))
     calibration = solved(settings, seen(settings, pose))
     assert abs(lowest_point(calibration, settings)) < 0.3
+
+
+def test_angles_are_told_with_the_spread_that_turns_of_the_leg_have() -> None:
+    """The standard deviations of omega, phi, kappa are those of poses drawn by the covariance."""
+    settings = cell_settings()
+    calibration = solved(settings, seen(settings, leg_pose()))
+    rng = np.random.default_rng(2)
+    skewed = rng.normal(size=(3, 3)) * 1e-4
+    covariance = calibration.solution.covariance.copy()
+    covariance[4:7, 4:7] = skewed @ skewed.T
+    solution = replace(calibration.solution, covariance=covariance)
+    told = document(replace(calibration, solution=solution), settings)["parameters"]
+    sigma = {p["name"]: p["sigma"] for p in told}
+    turns = rotation_from_vector(rng.multivariate_normal(np.zeros(3), covariance[4:7, 4:7], 20_000))
+    angles = angles_from_rotation(turns @ rotation_from_angles(solution.genes[8:11]))
+    for name, spread in zip(("omega", "phi", "kappa"), angles.std(axis=0), strict=True):
+        assert np.isclose(sigma[name], spread, rtol=0.03)
+    assert [name for name in GENES if sigma[name] is None] == ["f", "s_x", "s_y"]
 
 
 def test_one_wrong_mark_is_left_out_and_named() -> None:

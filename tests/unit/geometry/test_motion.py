@@ -1,5 +1,6 @@
 """Straight paths: true to the line, short enough, within the motors' rates, never drifting."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -128,3 +129,34 @@ def test_a_closed_gripper_stays_exactly_closed() -> None:
         move = move_between(MODEL, position, target)
         assert move.steps[5] == move.steps[2]
         position = target
+
+
+@settings(deadline=None)
+@given(start=poses, end=poses, ratio=st.sampled_from([-1.0, 0.0, 0.5, 1.0, 1.25]))
+def test_the_gripper_follows_the_elbow_by_what_the_model_says(
+    start: ToolPose, end: ToolPose, ratio: float
+) -> None:
+    """Motor 6 makes its share of motor 3's steps to half a step: the opening stays as it is."""
+    model = replace(MODEL, grip_per_elbow=ratio)
+    closed = (replace(pose, grip=0.0) for pose in (start, end))
+    path = straight_path(model, *closed)
+    for one, two, three, four, five, six in rounded(path, ratio):
+        assert abs(six - ratio * three) <= 0.5 + 1e-6
+        _, grip = joints_from_steps(model, (one, two, three, four, five, six))
+        assert abs(float(grip)) <= 0.5 / model.grip_steps_per_mm + 1e-6
+
+
+@settings(deadline=None)
+@given(start=poses, end=poses)
+def test_no_more_commands_than_in_equal_lengths(start: ToolPose, end: ToolPose) -> None:
+    """Cut where equal times end if that takes fewer; the search may miss the least by one."""
+    path = straight_path(MODEL, start, end)
+    even = straight_path(MODEL, start, end, pieces=2)
+    assert len(path) <= max(len(even), 2) + 1
+
+
+def test_a_line_along_which_the_joints_quicken_takes_fewer_commands_so() -> None:
+    """Toward the base the elbow turns faster and faster: equal lengths would waste commands."""
+    start, end = ToolPose(300.0, 0.0, 150.0), ToolPose(90.0, 0.0, 150.0)
+    path = straight_path(MODEL, start, end)
+    assert len(path) < len(straight_path(MODEL, start, end, pieces=2))
