@@ -17,6 +17,7 @@ from legato.records.errors import RecordError
 from legato.records.files import NO_JSON, encode, read_bytes, read_object
 
 EVENTS = "events.jsonl"
+EFFECTS = "effects.jsonl"
 SESSION = "session.json"
 
 
@@ -127,7 +128,9 @@ def _first_break(lines: list[bytes], seal: dict[str, Any] | None) -> tuple[int, 
                 return number, f"line {number} is changed: it says that it is {event['seq']}"
             continue
         if event["seq"] != number:
-            return number, f"line {number} is missing: {event['seq']!r} stands in its place"
+            later = any(e is not None and e["seq"] == number for e in events[number:])
+            lost = "out of order" if later else "missing"
+            return number, f"line {number} is {lost}: {event['seq']!r} stands in its place"
         # The two lines disagree: the one that a later line vouches for is the sound one.
         sound = hashes[number] in vouched or (number == len(lines) and seal is None)
         at = number - 1 if sound and number > 1 else number
@@ -146,7 +149,7 @@ def _against_seal(
         return len(lines) + 1, f"line {len(lines) + 1} is missing: the record ended with {count}"
     if len(lines) > count:
         return count + 1, f"line {count + 1} was added after the record had ended"
-    if seal != seal_of(lines, tail):
+    if any(seal.get(name) != value for name, value in seal_of(lines, tail).items()):
         at = max(count, 1)
         return at, f"line {at} is changed, or what follows it: the record's end has another hash"
     return None

@@ -3,6 +3,7 @@
 No symbolic link is followed. Every OSError comes out as a RecordError.
 """
 
+import hashlib
 import os
 import shutil
 from collections.abc import Callable
@@ -64,19 +65,33 @@ def replace_file(path: Path, data: bytes, *, rename: Rename = os.replace) -> Non
     temporary = path.with_name(f".{path.name}.tmp")
     with told("write", path):
         try:
-            flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | NO_LINK
-            descriptor = os.open(temporary, flags, FILE_MODE)
-            try:
-                write_all(descriptor, data)
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
+            _write(temporary, data)
             rename(temporary, path)
         except OSError:
             with suppress(OSError):
                 temporary.unlink()
             raise
         sync_folder(path.parent)
+
+
+def new_file(path: Path, data: bytes) -> None:
+    """Write a file into a folder that nobody looks into yet; file and entry are on the disk then.
+
+    Nothing is renamed: one journal commit does, where `replace_file` takes two.
+    """
+    with told("write", path):
+        _write(path, data)
+        sync_folder(path.parent)
+
+
+def _write(path: Path, data: bytes) -> None:
+    flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | NO_LINK
+    descriptor = os.open(path, flags, FILE_MODE)
+    try:
+        write_all(descriptor, data)
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def write_all(descriptor: int, data: bytes) -> None:
@@ -117,6 +132,12 @@ class LineFile:
             self._descriptor = os.open(path, flags, FILE_MODE)
             self._size = os.fstat(self._descriptor).st_size
         self.lines = 0  # appended by this object
+        self._hash = hashlib.sha256()
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 (hex) of all that this object has appended."""
+        return self._hash.hexdigest()
 
     def append(self, line: bytes, *, durable: bool = False) -> None:
         """Append `line` and a newline; with `durable` it is on the disk when this returns.
@@ -134,6 +155,7 @@ class LineFile:
                 raise
             self._size += len(data)
             self.lines += 1
+            self._hash.update(data)
             if durable:
                 os.fsync(self._descriptor)
 

@@ -5,9 +5,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from legato.records.chain import SESSION, read_events
+import msgspec
+
+from legato.records.chain import EFFECTS, SESSION, read_events, split_lines
 from legato.records.errors import RecordError
-from legato.records.files import read_bytes, read_object
+from legato.records.files import NO_JSON, read_bytes, read_object
 from legato.records.session import FRAMES, TRAJECTORY
 from legato.records.trajectory import parse
 
@@ -59,6 +61,25 @@ class SessionRecord:
         except RecordError as error:
             self.damage.append(error.text)
             return parse(b"")
+
+    @cached_property
+    def effects(self) -> list[dict[str, Any]]:
+        """The lines of effects.jsonl up to a tear; none where the session has no such file."""
+        try:
+            lines, _ = split_lines(read_bytes(self.path / EFFECTS))
+        except FileNotFoundError:
+            return []
+        found: list[dict[str, Any]] = []
+        for line in lines:
+            try:
+                value = msgspec.json.decode(line)
+            except NO_JSON:
+                value = None
+            if not isinstance(value, dict):
+                self.damage.append(f"{EFFECTS}: line {len(found) + 1} is none")
+                break
+            found.append(value)
+        return found
 
     @cached_property
     def frames(self) -> list[Path]:

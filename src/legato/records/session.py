@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from legato.records.chain import EVENTS, SESSION, digest, event_line
+from legato.records.chain import EFFECTS, EVENTS, SESSION, digest, event_line
 from legato.records.errors import RecordError
 from legato.records.files import LineFile, encode, make_folder, replace_file
 from legato.records.ids import checked_name
@@ -31,6 +31,8 @@ class SessionWriter:
         self._lock = threading.Lock()
         self._events = LineFile(path / EVENTS)
         self._rows: LineFile | None = None
+        self._effects: LineFile | None = None
+        self._files: dict[str, str] = {}  # the hash of each whole file, by its place
         self._seq = 0
         self._last = ""
         self._open = True
@@ -58,8 +60,9 @@ class SessionWriter:
         """Keep a picture as frames/`name`.png and return that path within the session."""
         place = f"{FRAMES}/{checked_name(name)}.png"
         with self._lock:
+            self._needs_open()
             make_folder(self.path / FRAMES)
-            replace_file(self.path / place, png)
+            self._replace(place, png)
         return place
 
     def document(self, name: str, document: Mapping[str, Any]) -> None:
@@ -68,7 +71,16 @@ class SessionWriter:
         if f"{name}.json" == SESSION:
             raise ValueError("session.json is written by begin and finish alone")
         with self._lock:
-            replace_file(self.path / f"{name}.json", encode(document) + b"\n")
+            self._needs_open()
+            self._replace(f"{name}.json", encode(document) + b"\n")
+
+    def effect(self, line: Mapping[str, Any]) -> None:
+        """Append one line of effects.jsonl: what a procedure asked for, and its answer."""
+        with self._lock:
+            self._needs_open()
+            if self._effects is None:
+                self._effects = LineFile(self.path / EFFECTS)
+            self._effects.append(encode(line))
 
     def trajectory(self, row: Mapping[str, Any]) -> None:
         """Append one row by column (see `trajectory_row`); columns left out stay empty."""
@@ -89,15 +101,19 @@ class SessionWriter:
         """
         with self._lock:
             self._needs_open()
-            for file in (self._events, self._rows):
+            for file in (self._events, self._rows, self._effects):
                 if file is not None:
                     file.sync()
+            whole = {f.path.name: f.hash for f in (self._rows, self._effects) if f is not None}
             meta = self._meta | {
                 "ended": ended,
                 "outcome": outcome,
                 "reason": reason,
                 "cause": cause,
-                "seal": {"events": self._seq, "last": self._last, "torn": 0},
+                "seal": {
+                    **{"events": self._seq, "last": self._last, "torn": 0},
+                    "files": self._files | whole,
+                },
             }
             replace_file(self.path / SESSION, encode(meta) + b"\n")
             self._meta = meta
@@ -111,9 +127,13 @@ class SessionWriter:
 
     def _close(self) -> None:
         self._open = False
-        self._events.close()
-        if self._rows is not None:
-            self._rows.close()
+        for file in (self._events, self._rows, self._effects):
+            if file is not None:
+                file.close()
+
+    def _replace(self, place: str, data: bytes) -> None:
+        replace_file(self.path / place, data)
+        self._files[place] = digest(data)
 
     def _needs_open(self) -> None:
         if not self._open:

@@ -19,6 +19,7 @@ from legato.records.errors import RecordError, told
 from legato.records.files import (
     encode,
     make_folder,
+    new_file,
     read_bytes,
     read_object,
     remove_folder,
@@ -28,9 +29,11 @@ from legato.records.files import (
 from legato.records.ids import SESSION_ID, checked_id, moment, session_id
 from legato.records.record import SessionRecord, read_session
 from legato.records.session import FRAMES, SessionWriter
+from legato.records.whole import file_hashes
 
 BEGUN = ".begun-"
 PRUNED = ".pruned-"
+DAY = timedelta(days=1)
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ class Store:
         with told("begin a session in", self.folder):
             try:
                 (fresh / EVENTS).touch(mode=0o640)
-                replace_file(fresh / SESSION, encode(meta) + b"\n")
+                new_file(fresh / SESSION, encode(meta) + b"\n")
                 fresh.rename(final)
             except OSError as error:
                 if error.errno not in (EEXIST, ENOTEMPTY):
@@ -124,27 +127,45 @@ class Store:
             "outcome": "interrupted",
             "reason": reason,
             "cause": "interrupted",
-            "seal": _seal(path),
+            "seal": _seal(path) | {"files": file_hashes(path)},
         }
         replace_file(path / SESSION, encode(meta) + b"\n")
 
-    def prune(self, keep_days: float, now: datetime) -> list[str]:
-        """Remove sessions that ended more than `keep_days` before `now`; return their ids.
+    def sweep(self, left: tuple[str, ...] = (BEGUN, PRUNED)) -> None:
+        """Remove what an interrupted begin or prune left; only while no session can begin."""
+        if not self.folder.is_dir():
+            return
+        with told("read", self.folder):
+            entries = list(os.scandir(self.folder))
+        for entry in entries:
+            if entry.name.startswith(left) and entry.is_dir(follow_symlinks=False):
+                remove_folder(Path(entry.path))
 
-        A session without an outcome stays whatever its age.
+    def prune(
+        self, keep_days: float, now: datetime, *, min_free_mb: float = 0.0, keep_newest: int = 0
+    ) -> list[str]:
+        """Remove finished sessions that are too old or in the way; return their ids.
+
+        Too old: ended more than `keep_days` before `now`. In the way: the oldest, as long as less
+        than `min_free_mb` is free. A session without an outcome stays, and so do the `keep_newest`
+        latest, whatever the clock says, and all that ended within a day.
         """
-        self._sweep()
+        self.sweep((PRUNED,))
         removed = []
-        for summary in reversed(self.sessions()):
-            if summary.outcome is None or not _older(summary, now - timedelta(days=keep_days)):
+        for summary in self.sessions()[keep_newest:][::-1]:
+            if summary.outcome is None or not _older(summary, now - DAY):
                 continue
-            path = self.folder / summary.id
-            gone = self.folder / f"{PRUNED}{summary.id}"
-            with told("remove", path):
-                path.rename(gone)
-            remove_folder(gone)
-            removed.append(summary.id)
+            if _older(summary, now - timedelta(days=keep_days)) or self.free_mb() < min_free_mb:
+                self._remove(summary.id)
+                removed.append(summary.id)
         return removed
+
+    def _remove(self, session: str) -> None:
+        """Remove a session's folder; what a crash leaves of it is no session any more."""
+        path, gone = self.folder / session, self.folder / f"{PRUNED}{session}"
+        with told("remove", path):
+            path.rename(gone)
+        remove_folder(gone)
 
     def load_state(self) -> dict[str, Any]:
         """Return what `save_state` kept last, empty where it never did."""
@@ -211,17 +232,6 @@ class Store:
             with told("move", path / SESSION):
                 (path / SESSION).rename(path / "session.damaged")
             return _stand_in(path)
-
-    def _sweep(self) -> None:
-        """Remove what an interrupted begin or prune left."""
-        if not self.folder.is_dir():
-            return
-        with told("read", self.folder):
-            entries = list(os.scandir(self.folder))
-        for entry in entries:
-            left = entry.name.startswith((BEGUN, PRUNED))
-            if left and entry.is_dir(follow_symlinks=False):
-                remove_folder(Path(entry.path))
 
 
 def _stand_in(path: Path) -> dict[str, Any]:

@@ -182,13 +182,44 @@ def test_prune_removes_old_finished_sessions_only(store: Store, begin: Begin) ->
     assert store.prune(30, NOW) == []
 
 
-def test_prune_finishes_what_a_crash_left(store: Store, begin: Begin) -> None:
-    """Half a removal or half a beginning is no session, and is swept away."""
+def test_with_too_little_room_the_oldest_go_first(store: Store, begin: Begin) -> None:
+    """Only as many as it takes; never the newest, the unfinished, or those of the last day."""
+    ages = (50, 40, 30, 20, 10)
+    old = [begin(1, at(days)) for days in ages]
+    running, today = begin(1, at(60)), begin(1, at(0.9))
+    for writer, days in zip([*old, today], [*ages, 0.9], strict=True):
+        writer.finish("done", None, None, at(days))
+    rooms = iter([100.0, 150.0, 300.0, 300.0, 300.0, 300.0])
+    store.free_mb = lambda: next(rooms)  # type: ignore[method-assign] # a disk that fills up
+    assert store.prune(90, NOW, min_free_mb=200, keep_newest=2) == [old[0].id, old[1].id]
+    store.free_mb = lambda: 0.0  # type: ignore[method-assign]
+    removed = store.prune(90, NOW, min_free_mb=200, keep_newest=2)
+    assert removed == [old[2].id, old[3].id]
+    left = {s.id for s in store.sessions()}
+    assert left == {running.id, today.id, old[4].id}
+    assert store.prune(90, NOW, min_free_mb=200) == [old[4].id]
+    running.close()
+
+
+def test_a_clock_that_jumps_ahead_leaves_the_newest(store: Store, begin: Begin) -> None:
+    """By a clock that is years off everything is old: the newest stay all the same."""
+    writers = [begin(1, at(days)) for days in (3, 2, 1)]
+    for writer in writers:
+        writer.finish("done", None, None, at(0))
+    future = NOW + timedelta(days=9000)
+    assert store.prune(90, future, keep_newest=2) == [writers[0].id]
+
+
+def test_what_a_crash_left_is_swept_away(store: Store, begin: Begin) -> None:
+    """Half a removal or half a beginning is no session; a beginning under way is let be."""
     begin(1)
     for left in (".pruned-20200101T000000Z-aaaa", ".begun-20200101T000000Z-bbbb"):
         (store.folder / left).mkdir()
     assert len(store.sessions()) == 1
     store.prune(30, NOW)
+    assert len(list(store.folder.glob(".begun-*"))) == 1
+    assert not list(store.folder.glob(".pruned-*"))
+    store.sweep()
     assert len(list(store.folder.iterdir())) == 1
 
 
