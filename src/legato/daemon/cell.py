@@ -2,7 +2,7 @@
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from legato.config.build import arm_model, leg
@@ -60,8 +60,32 @@ def build_clock(loaded: "Loaded") -> Clock:
 
 def build_cell(loaded: "Loaded", clock: Clock | None = None) -> Cell:
     """Return arm and camera as configured, not yet opened. Loads the drivers' libraries."""
-    config = loaded.config
     clock = clock if clock is not None else build_clock(loaded)
+    return _with_faults(_sound_cell(loaded.config, clock), loaded.config)
+
+
+def _with_faults(cell: Cell, config: Config) -> Cell:
+    """Return a cell whose arm and camera go wrong as `[sim.faults]` says; real ones too.
+
+    The witness stays the world's own: it tells what truly happened.
+    """
+    faults = config.sim.faults
+    if not faults:
+        return cell
+    from legato.drivers.faulty.arm import faulty_arm
+    from legato.drivers.faulty.camera import FaultyCamera
+
+    of_arm = [fault for fault in faults if fault.device == "arm"]
+    of_camera = [fault for fault in faults if fault.device == "camera"]
+    return replace(
+        cell,
+        arm=faulty_arm(cell.arm, of_arm, cell.clock) if of_arm else cell.arm,
+        camera=FaultyCamera(cell.camera, of_camera, cell.clock) if of_camera else cell.camera,
+    )
+
+
+def _sound_cell(config: Config, clock: Clock) -> Cell:
+    """Return arm and camera as the configuration names them."""
     if "sim" not in (config.robot.driver, config.camera.driver):
         return Cell(_real_arm(config, clock), _real_camera(config), clock)
     from legato.drivers.sim.arm import SimArm

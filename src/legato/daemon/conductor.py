@@ -7,7 +7,7 @@ state has a deadline, and after an estop the worker sends nothing more.
 from collections.abc import Mapping
 from typing import Any
 
-from legato.control.states import FAULT, IDLE, PAUSED, STOPPING, NotAllowed, moves
+from legato.control.states import FAULT, IDLE, PAUSED, STOPPING, NotAllowed
 from legato.control.table import pausable
 from legato.daemon import reports
 from legato.daemon.admission import (
@@ -17,13 +17,14 @@ from legato.daemon.admission import (
     need_free_worker,
     need_worker,
 )
+from legato.daemon.campaigns import campaigns_of
 from legato.daemon.closing import LET_GO_S, Closing
+from legato.daemon.faulting import Faulting
 from legato.daemon.journal import Journal
 from legato.daemon.lease import Leases
 from legato.daemon.log import Log, note
 from legato.daemon.messages import (
     DevicesKnown,
-    FaultReport,
     Happened,
     JobEnded,
     Looked,
@@ -34,6 +35,7 @@ from legato.daemon.messages import (
     WorkerGone,
 )
 from legato.daemon.orders import DoJob, Orders
+from legato.daemon.repeat import Repeater
 from legato.daemon.sessions import Session
 from legato.daemon.standing import Setting, Standing
 from legato.daemon.tasks import Tasks
@@ -74,7 +76,9 @@ class Conductor:
         self._busy: str | None = None
         self._versions: Mapping[str, str] = {}
         self._closing: Closing | None = None
-        self._fault_to_come: FaultReport | None = None
+        self._faulting = Faulting(standing, journal, orders)
+        self.campaigns = campaigns_of(setting, standing, journal, store, log, self.tasks)
+        self.repeater = Repeater(self.campaigns, self.leases, self.start, self.reset)
 
     @property
     def state(self) -> str:
@@ -83,11 +87,13 @@ class Conductor:
 
     # What requests ask for; each may raise Failure. The total table has been asked before.
 
-    def start(self, job: str, key: str | None, *, by: str, since: int) -> Session:
+    def start(self, job: str, key: str | None, *, by: str, since: int, **params: Any) -> Session:
         """Begin a job's session and hand it to the worker.
 
         A stop after the gate's first `since` came after this request was sent.
         """
+        if "campaign" not in params:
+            self.campaigns.need_none(job)
         need_worker(job, self._busy, ending=self._closing is not None)
         if self.gate.stopped_since(since):
             hint = "send it again if it is still wanted"
@@ -95,21 +101,22 @@ class Conductor:
         need_all(job, self.standing.view, self._setting, self._store)
         first = first_state(job, self._setting.settings.stations)
         try:
-            session = self.standing.begin(job, key, by, self._versions, first)
+            session = self.standing.begin(job, key, by, self._versions, first, params)
         except RecordError as error:
             raise Failure("precondition", error.text, error.hint) from error
         assert session.writer is not None
         self._busy = job
-        self._orders.give(DoJob(session.id, job, session.writer), since)
-        self._see_disk()
+        self._orders.give(DoJob(session.id, job, session.writer, params), since)
+        self._faulting.see_disk()
         return session
 
     def stop(self, by: str | None = None) -> None:
-        """Let the running job retract and end."""
-        if self.state != STOPPING:
+        """Let the running job retract and end; a campaign ends with it, or at once between jobs."""
+        self.campaigns.end("stopped", f"stopped by {by or 'nobody known'}")
+        if self.standing.running and self.state != STOPPING:
             self._orders.stop()
             self.standing.enter(STOPPING, "stop", by)
-            self._see_disk()
+            self._faulting.see_disk()
 
     def pause(self, by: str | None = None, cause: str = "pause") -> None:
         """Let the running job retract and hold."""
@@ -123,20 +130,24 @@ class Conductor:
     def estop(self, by: str | None = None) -> None:
         """Let no further motion command go out, in any state."""
         self._orders.drop()
+        self.campaigns.end("fault", reports.estop(by).text)
         broken_off = self.tasks.break_off()
         if broken_off is not None:
             no = Failure("in_fault", "an emergency stop came in between", "send reset again")
             self.settled.append((("task", broken_off), no))
-        self._fail(reports.estop(by), by)
+        self._faulting.fail(reports.estop(by), by)
 
-    def reset(self) -> int:
+    def reset(self, by: str | None = None) -> int:
         """Ask the worker whether arm and camera answer; return the task's number."""
         need_free_worker(self._busy)
+        if by is not None:  # a person is there, and takes the cell over
+            self.campaigns.end("stopped", f"{by} has sent reset")
         self._busy = "reset"
         return self.tasks.reset()
 
     def reference(self, pose: ToolPose) -> int:
         """Let the worker take the arm to stand at a pose; return the task's number."""
+        self.campaigns.need_none("reference")
         need_worker("reference", self._busy, ending=self._closing is not None)
         need_devices("reference", self.standing.view)
         self._busy = "reference"
@@ -146,6 +157,7 @@ class Conductor:
         """Begin to end: a running job retracts first."""
         if self._closing is None:
             self._closing = Closing(self._orders, self.standing.now)
+            self.campaigns.end("interrupted", "the daemon was told to end")
             if self.standing.sessions.current is not None and self.state != FAULT:
                 self.stop(by)
 
@@ -165,6 +177,8 @@ class Conductor:
             case Happened(session, kind, data):
                 if standing.is_current(session):
                     standing.happened(kind, data)
+                    if kind == "contact":
+                        self.campaigns.touch(data)
             case Moved(session, view, data):
                 standing.view = view
                 if standing.is_current(session):
@@ -177,7 +191,7 @@ class Conductor:
                 self._worker_gone(text)
             case _:
                 note(self._log, message)
-        self._see_disk()
+        self._faulting.see_disk()
 
     def tick(self, now: float) -> None:
         """Let time pass: deadlines, heartbeat, the end."""
@@ -186,24 +200,29 @@ class Conductor:
         self._see_gate()
         self._see_lease(now)
         if now > standing.due:
-            self._fail_after_retreat(reports.deadline(standing.state, standing.in_state_s))
+            self._faulting.fail_after_retreat(reports.deadline(standing.state, standing.in_state_s))
         stuck = standing.sessions.current is not None and standing.in_state_s > LET_GO_S
         if standing.state == FAULT and stuck:
             self._settle_session(standing.end_in_fault())
         standing.beat()
         if self._closing is not None:
             self._close(self._closing, now)
+        elif self.campaigns.current is not None:
+            self.repeater.go_on(self.state, standing.fault, now, free=self._busy is None)
 
     def next_due(self) -> float:
         """Return when `tick` is due next."""
-        return min(self.standing.beat_at, self.standing.due, self.leases.next_due())
+        due = min(self.standing.beat_at, self.standing.due, self.leases.next_due())
+        if self.campaigns.current is None:
+            return due
+        return min(due, self.campaigns.next_due(self.standing.now))
 
     def _see_gate(self) -> None:
         """Follow what the stop line has asked for; the worker heeds it without waiting for this."""
         for asked in self.gate.news():
             if asked.estop:
                 self.estop(asked.by)
-            elif self.standing.running:
+            else:
                 self.stop(asked.by)
 
     def _see_lease(self, now: float) -> None:
@@ -228,9 +247,9 @@ class Conductor:
         standing = self.standing
         self._busy, standing.view = None, end.view
         if standing.is_current(end.session):
-            fault = self._fault_to_come or end.fault
+            fault = self._faulting.to_come or end.fault
             if fault is not None:
-                self._fail(fault)
+                self._faulting.fail(fault)
             if standing.state == FAULT:
                 self._settle_session(standing.end_in_fault())
             else:
@@ -247,6 +266,8 @@ class Conductor:
         failure = Failure("unavailable", *end.problem) if end.problem is not None else None
         if self.tasks.ended(end.token, well=failure is None):
             standing.clear()
+        problem = end.problem[0] if end.problem is not None else None
+        self.campaigns.end_task(end.token, problem, standing.now)
         standing.keep()
         result = {"state": standing.state, "arm": dict(standing.view.arm)}
         self.settled.append((("task", end.token), failure or result))
@@ -255,39 +276,17 @@ class Conductor:
         if text is not None:
             self._log.error("worker_gone", traceback=text)
             self.exit_code = 1
-            self._fail(reports.worker_gone(text))
+            self._faulting.fail(reports.worker_gone(text))
         if self.standing.sessions.current is not None:
             self._settle_session(self.standing.end_in_fault())
         self.standing.keep()
         self.finished = True
 
-    def _fail_after_retreat(self, report: FaultReport) -> None:
-        """Latch a fault that is not the arm's own once the job has come off the leg.
-
-        The retreat is a stop like any other, with that state's deadline.
-        """
-        if not moves(self.state) or self.state == STOPPING:
-            self._fail(self._fault_to_come or report)
-            return
-        self._fault_to_come = report
-        self._orders.stop()
-        self.standing.enter(STOPPING, str(report.cause))
-
-    def _fail(self, report: FaultReport, by: str | None = None) -> None:
-        """Latch a fault; nothing more goes to the arm."""
-        self._fault_to_come = None
-        self._orders.drop()
-        self.standing.fail(report, by)
-
     def _settle_session(self, session: str) -> None:
+        known = self.standing.sessions.find(session)
+        if known is not None:
+            self.campaigns.end_session(known, self.standing.now)
         self.settled.append((("session", session), {}))
-
-    def _see_disk(self) -> None:
-        """Go to fault where the disk did not take a record."""
-        error = self._journal.take_error()
-        if error is not None and self._fault_to_come is None:
-            self._fail_after_retreat(reports.disk(error))
-            self._journal.take_error()
 
     def _close(self, closing: Closing, now: float) -> None:
         """Go on ending: wait for the job, then for the worker, neither for ever."""

@@ -3,13 +3,13 @@
 What cannot be answered at once waits here without blocking anybody. Junk is answered and counted.
 """
 
-import math
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, assert_never
 
 from legato.control.settings import CellSettings
-from legato.control.table import JOBS, METHODS, READERS, admit, authorise
+from legato.control.table import CAMPAIGN, JOBS, METHODS, READERS, admit, authorise
+from legato.daemon.asked import params_of, pose_of
 from legato.daemon.conductor import Conductor
 from legato.daemon.events import Events
 from legato.daemon.log import Log
@@ -17,12 +17,13 @@ from legato.daemon.sessions import Session as KnownSession
 from legato.daemon.status import describe
 from legato.daemon.waiters import DEVICES, Ask, Waiter, Waiters, What
 from legato.daemon.who import LOCAL, Who
-from legato.geometry.arm import Unreachable, reach
-from legato.geometry.motion import ToolPose
 from legato.wire.jsonrpc import Failure, Malformed, answer, decode_params, receive, refuse
 from legato.wire.requests import (
     Acting,
+    Campaign,
+    Campaigns,
     Describe,
+    EndCampaign,
     Estop,
     EventsSince,
     Job,
@@ -45,7 +46,8 @@ TASK_S = 20.0  # how long reset and reference may take
 # How long a job waits for devices that are being opened: less than any client waits, so that no
 # job begins that somebody was told had failed.
 JOB_WAIT_S = 3.0
-NEED_DEVICES = (*JOBS, "reference", "reset")
+STARTS = (*JOBS, CAMPAIGN)
+NEED_DEVICES = (*STARTS, "reference", "reset")
 
 Result = Mapping[str, Any]
 Send = Callable[[list[bytes]], None]
@@ -144,14 +146,20 @@ class Desk:
             known = self._conductor.standing.sessions.with_key(request.key)
             if known is not None:
                 return self._repeated(call.method, known)
+        if isinstance(request, Campaign) and request.key is not None:
+            begun = self._conductor.campaigns.with_key(request.key)
+            if begun is not None:
+                return {"campaign": begun, "session": None, "state": self._conductor.state}
         if isinstance(request, Acting):
             self._in_time(request, now)
             self._conductor.leases.check(request.lease, ask.who, now)
         if call.method in NEED_DEVICES and not self._conductor.devices_known:
-            patience = JOB_WAIT_S if call.method in JOBS else TASK_S
+            patience = JOB_WAIT_S if call.method in STARTS else TASK_S
             return self._later(ask, DEVICES, now + patience)
         no = admit(call.method, self._conductor.state)
-        if no is not None:
+        # Between its repetitions nothing runs, and a stop still ends a campaign.
+        ends = isinstance(request, Stop) and self._conductor.campaigns.underway is not None
+        if no is not None and not ends:
             raise Failure(no.code, no.reason, no.hint)
         return self._done(ask, request, now)
 
@@ -169,7 +177,8 @@ class Desk:
                 return {"boot": self._events.boot, "state": conductor.state, "now": now}
             case Status():
                 lease = conductor.leases.told(now)
-                return conductor.standing.status() | {"lease": lease, "stop": self._stops()}
+                told = conductor.standing.status() | {"lease": lease, "stop": self._stops()}
+                return told | {"campaign": conductor.campaigns.told()}
             case Describe():
                 return describe(self._settings.stations)
             case Wait(session=session, timeout_s=timeout):
@@ -184,8 +193,16 @@ class Desk:
             case EventsSince(boot=boot, seq=seq, limit=limit):
                 return self._events.since(boot, seq, limit)
             case Job(key=key):
-                started = conductor.start(ask.call.method, key, by=by, since=ask.since)
+                params = params_of(request, self._settings)
+                started = conductor.start(ask.call.method, key, by=by, since=ask.since, **params)
                 return {"session": started.id, "state": conductor.state}
+            case Campaign():
+                begun = conductor.repeater.begin(request, by=by, since=ask.since, now=now)
+                return begun | {"state": conductor.state}
+            case EndCampaign():
+                return conductor.campaigns.asked_to_end(by)
+            case Campaigns():
+                return conductor.campaigns.listed(request)
             case Pause():
                 conductor.pause(by)
             case Resume():
@@ -195,9 +212,9 @@ class Desk:
             case Estop():
                 conductor.estop(by)
             case Reset():
-                return self._later(ask, ("task", conductor.reset()), now + TASK_S)
+                return self._later(ask, ("task", conductor.reset(by)), now + TASK_S)
             case Reference():
-                token = conductor.reference(self._pose(request))
+                token = conductor.reference(pose_of(request, self._settings))
                 return self._later(ask, ("task", token), now + TASK_S)
             case Lease():
                 return conductor.leases.ask(request, ask.who, now)
@@ -248,25 +265,12 @@ class Desk:
             raise Failure("invalid_params", f"there is no session {session!r}", "see sessions")
         return known
 
-    def _pose(self, request: Reference) -> ToolPose:
-        """Return the pose that the operator tells, the configured start pose where nothing is."""
-        start = self._settings.start
-        x, y, z = request.xyz_mm if request.xyz_mm is not None else (start.x, start.y, start.z)
-        pitch = start.pitch if request.pitch_deg is None else math.radians(request.pitch_deg)
-        roll = start.roll if request.roll_deg is None else math.radians(request.roll_deg)
-        try:
-            reach(self._settings.arm, (x, y, z), pitch, roll)
-        except Unreachable as error:
-            hint = "give the pose at which the arm truly stands"
-            raise Failure("invalid_params", f"the arm cannot stand there: {error}", hint) from error
-        return ToolPose(x, y, z, pitch, roll, start.grip)
-
     def _reply(self, ask: Ask, result: Result) -> None:
         call, by = ask.call, ask.who.name
-        told = self._log.debug if call.method in READERS else self._log.info
-        told("request", method=call.method, ok=True, by=by, state=self._conductor.state)
         if not call.notification:
             self._send(answer(call.route, call.id, result))
+        told = self._log.debug if call.method in READERS else self._log.info
+        told("request", method=call.method, ok=True, by=by, state=self._conductor.state)
 
     def _refuse(self, ask: Ask, failure: Failure) -> None:
         call, state = ask.call, self._conductor.state

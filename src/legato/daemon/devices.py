@@ -90,7 +90,11 @@ class Devices:
         return reading
 
     def grab(self) -> Frame:
-        """Return a picture. Raises DeviceError, after which the camera counts as gone."""
+        """Return a picture, from a camera that counts as gone after opening it anew.
+
+        Raises DeviceError, after which the camera counts as gone.
+        """
+        self._open_camera()
         try:
             frame = self.cell.camera.grab()
         except DeviceError:
@@ -194,6 +198,8 @@ class Devices:
 def steps_of(settings: CellSettings, pose: ToolPose) -> Steps:
     """Return the absolute steps of a pose; raises geometry.arm.Unreachable."""
     joints = reach(settings.arm, pose.xyz, pose.pitch, pose.roll)
-    (whole,) = rounded(steps_from_joints(settings.arm, joints, pose.grip)[None])
+    (whole,) = rounded(
+        steps_from_joints(settings.arm, joints, pose.grip)[None], settings.arm.grip_per_elbow
+    )
     one, two, three, four, five, six = (int(v) for v in whole)
     return one, two, three, four, five, six

@@ -107,6 +107,8 @@ class Gate:
 
     def news(self) -> list[Asked]:
         """Return the latest estop and stop, as far as this has not returned them before."""
+        if self.number == self._seen:
+            return []
         seen, both = self._seen, (self.estop, self.stop)
         found = [asked for asked in both if asked is not None and asked.number > seen]
         self._seen = max([seen, *(asked.number for asked in found)])

@@ -15,7 +15,10 @@ from legato.records.store import Store
 
 
 class Journal:
-    """Record, events and state.json together; `clock` is the cell's s, `arm` names a real arm."""
+    """Record, events and state.json together; `clock` is the cell's s, `arm` names a real arm.
+
+    `heard` is told of every event that was published.
+    """
 
     def __init__(
         self,
@@ -26,6 +29,7 @@ class Journal:
         log: Log,
         last: tuple[Any, Any] = (None, None),
         arm: str | None = None,
+        heard: Callable[[str, Mapping[str, Any]], None] = lambda _, __: None,
     ) -> None:
         self._sessions = sessions
         self._events = events
@@ -34,7 +38,9 @@ class Journal:
         self._log = log
         self._last = last
         self._arm = arm
+        self._heard = heard
         self._error: RecordError | None = None
+        self._state: Mapping[str, Any] | None = None  # what is not on the disk yet
 
     def tell(self, topic: str, data: Mapping[str, Any], *, durable: bool = False) -> None:
         """Record an event under the running session, then publish it."""
@@ -48,6 +54,7 @@ class Journal:
         """Publish without a record."""
         current = self._sessions.current
         self._events.emit(topic, current.id if current else None, data)
+        self._heard(topic, data)
 
     def take_error(self) -> RecordError | None:
         """Return what the disk has refused since this was asked last."""
@@ -59,13 +66,26 @@ class Journal:
         if view.memory is not None:
             self._last = view.memory.reference, view.memory.registers
         reference, registers = self._last
-        state = {
+        self._state = {
             "boot": self._events.boot,
             "fault": fault,
             "arm": self._arm,
             "simulated": self._arm is None,
+            "reference": reference,
+            "registers": registers,
         }
+        self._save()
+
+    def keep_again(self) -> None:
+        """Try once more to keep what the disk did not take, or the next start would not know it."""
+        if self._state is not None:
+            self._save(again=True)
+
+    def _save(self, *, again: bool = False) -> None:
+        assert self._state is not None, "there is something to keep"
         try:
-            self._store.save_state(state | {"reference": reference, "registers": registers})
+            self._store.save_state(self._state)
+            self._state = None
         except RecordError as error:
-            self._log.error("state_not_kept", text=error.text, hint=error.hint)
+            if not again:
+                self._log.error("state_not_kept", text=error.text, hint=error.hint)

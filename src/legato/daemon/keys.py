@@ -75,7 +75,11 @@ def make_keys(folder: Path, name: str, role: str) -> tuple[Path, Path]:
 
 
 def read_secret(file: Path, key: str) -> Keys:
-    """Return the pair in a secret file. Raises ConfigError, also where others can read it."""
+    """Return the pair in a secret file. Raises ConfigError, also where others can read it.
+
+    Among systemd's credentials one of the same file name comes first.
+    """
+    file = _credential(file)
     _check_mode(file, key, 0o077, "a file that only its owner can read", f"chmod 600 {file}")
     found = decode(read_toml(file, "a key's secret file"), SecretFile, file)
     pair = found.public.encode(), found.secret.encode()
@@ -140,10 +144,19 @@ def _check_mode(file: Path, key: str, forbidden: int, expected: str, hint: str) 
             file, key, str(file), f"a file that can be read: {error.strerror}", HINT
         ) from error
     # The folder of systemd's credentials is closed to others, whatever its files' bits say.
-    if mode & forbidden and file.parent != Path(
-        os.environ.get("CREDENTIALS_DIRECTORY", "/nowhere")
-    ):
+    if mode & forbidden and file.parent != _credentials():
         raise ConfigError(file, key, f"mode {mode:04o}", expected, hint)
+
+
+def _credentials() -> Path | None:
+    """Return the folder in which systemd has put this service's credentials."""
+    folder = os.environ.get("CREDENTIALS_DIRECTORY")
+    return Path(folder) if folder else None
+
+
+def _credential(file: Path) -> Path:
+    folder = _credentials()
+    return folder / file.name if folder is not None and (folder / file.name).is_file() else file
 
 
 def _derived(secret: bytes) -> bytes:

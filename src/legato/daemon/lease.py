@@ -61,6 +61,22 @@ class Leases:
             reason = f"{held.who.name} has the lease for another {left:.1f} s"
             raise Failure("busy", reason, "wait for its end; stop and estop need no lease")
 
+    def manned(self, name: str) -> bool:
+        """Say whether a client holds the lease with a deadman."""
+        held = self._held
+        return held is not None and held.deadman and held.who.name == name
+
+    def need_for(self, name: str, *, manned: bool) -> None:
+        """Raise Failure where what a client began earlier must not go on by itself.
+
+        Another has the lease now; or, where it was `manned`, the lease with a deadman has ended.
+        """
+        held = self._held
+        if held is not None and held.who.name != name:
+            raise Failure("busy", f"{held.who.name} has the lease", "ask for it again afterwards")
+        if manned and not self.manned(name):
+            raise Failure("expired", f"the lease of {name} with a deadman has ended", "begin anew")
+
     def unmanned(self, now: float, *, running: bool, pausable: bool) -> str | None:
         """Return who has lost a lease with a deadman, once, as soon as the arm can be paused.
 
@@ -68,6 +84,8 @@ class Leases:
         missed.
         """
         held = self._held
+        if held is None and self._unmanned is None:
+            return None
         if held is not None and now >= held.until:
             self._held = None
             self._log.warning("lease_lost", by=held.who.name, deadman=held.deadman)

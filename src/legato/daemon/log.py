@@ -1,9 +1,11 @@
 """The daemon's log, and the only home of structlog: JSON lines for the journal, colours for people.
 
 Everything goes to stderr. Work that changes something is told at info, plain looking at debug.
+A line that stderr does not take, on a full disk or with nobody reading, is lost and no more.
 """
 
 import sys
+from contextlib import suppress
 from functools import cached_property
 from typing import Any, Protocol, TextIO
 
@@ -29,6 +31,9 @@ class Log(Protocol):
 def make_log(stream: TextIO | None = None, level: str = "info") -> Log:
     """Return a logger that writes to `stream` (stderr); other loggers stay as they are."""
     return _Late(stream if stream is not None else sys.stderr, level)
+
+
+LOST = (OSError, ValueError)  # no room, nobody reads, closed
 
 
 class _Late:
@@ -59,16 +64,20 @@ class _Late:
 
     def debug(self, event: str, **fields: Any) -> None:
         if self._level == "debug":
-            self._log.debug(event, **fields)
+            with suppress(*LOST):
+                self._log.debug(event, **fields)
 
     def info(self, event: str, **fields: Any) -> None:
-        self._log.info(event, **fields)
+        with suppress(*LOST):
+            self._log.info(event, **fields)
 
     def warning(self, event: str, **fields: Any) -> None:
-        self._log.warning(event, **fields)
+        with suppress(*LOST):
+            self._log.warning(event, **fields)
 
     def error(self, event: str, **fields: Any) -> None:
-        self._log.error(event, **fields)
+        with suppress(*LOST):
+            self._log.error(event, **fields)
 
 
 def note(log: Log, message: Message) -> None:

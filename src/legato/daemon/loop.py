@@ -54,7 +54,8 @@ class Loop:
         self._poller = zmq.Poller()
         self._poller.register(sockets.requests, zmq.POLLIN)
         self._poller.register(sockets.events, zmq.POLLIN)
-        self._poller.register(mailbox.fileno(), zmq.POLLIN)
+        self._mail = mailbox.fileno()
+        self._poller.register(self._mail, zmq.POLLIN)
 
     def run(self, end: Callable[[], bool] = lambda: False) -> None:
         """Serve until the conductor has finished; once `end()` says so, the end begins."""
@@ -69,14 +70,16 @@ class Loop:
         if self._before:
             due = 0.0
         heard = dict(self._poller.poll(ceil(max(due - self._now(), 0.0) * 1000.0)))
-        self._conductor.tick(self._now())
-        if self._mailbox.fileno() in heard:
+        self._conductor.standing.now = self._now()
+        if self._mail in heard:
             for message in self._mailbox.drain():
                 self._conductor.receive(message)
         # What is asked first is answered first; a stop is looked for whatever has come.
         self._requests()
         if self._sockets.events in heard:
             self._subscriptions()
+        # Whoever asks is answered before time is let pass: nothing is due for so short a while.
+        self._conductor.tick(self._now())
         self._desk.settle(self._now())
         self._tell()
 

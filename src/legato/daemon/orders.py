@@ -6,13 +6,14 @@ stands in the gate, which needs no lock to be closed.
 
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from legato.control.effects import PauseRequested, StopRequested
 from legato.daemon.gate import Gate
+from legato.daemon.trail import Trail
 from legato.geometry.motion import ToolPose
 
 if TYPE_CHECKING:
@@ -21,11 +22,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DoJob:
-    """Carry out a job under a session's record."""
+    """Carry out a job under a session's record; `params` is what else it was asked with."""
 
     session: str
     job: str
     writer: "SessionWriter"
+    params: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,7 @@ class Orders:
 
     def __init__(self, gate: Gate | None = None) -> None:
         self.gate = gate if gate is not None else Gate()
+        self.trail = Trail()
         self._changed = threading.Condition()
         self._tasks: deque[Task] = deque()
         self._stop = False

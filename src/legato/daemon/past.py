@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+from legato.daemon.campaign_files import CampaignFiles, close_interrupted
 from legato.daemon.log import Log
 from legato.geometry.motion import Steps
 from legato.hal.faults import Cause
@@ -51,6 +52,7 @@ def read_past(store: Store, log: Log, *, arm: str | None) -> Past:
     for summary in open_ones:
         store.close_interrupted(summary.id)
         log.warning("interrupted", session=summary.id, job=summary.job)
+    close_interrupted(CampaignFiles(store.state_dir), log)
     last = _arms_place(state) if arm is not None and arm == state.get("arm") else (None, None)
     return Past(fault, store.sessions() if open_ones else summaries, last, arm)
 

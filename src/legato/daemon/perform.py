@@ -4,13 +4,13 @@ Every effect raises what it meets; the procedure is told, and the worker makes i
 """
 
 import time
-from collections import deque
 from collections.abc import Callable, Generator
 from typing import Any, assert_never
 
 import numpy as np
 
 from legato.control import envelope
+from legato.control.document import residuals_told
 from legato.control.effects import (
     CellFault,
     Dwell,
@@ -32,10 +32,11 @@ from legato.control.settings import CellSettings
 from legato.daemon.devices import Devices
 from legato.daemon.messages import Happened, Message, Moved, StateWanted
 from legato.daemon.orders import Dropped, Orders
+from legato.daemon.patience import Patience
 from legato.geometry.arm import forward, joints_from_steps
 from legato.hal.arm import ArmReading
 from legato.hal.camera import Frame
-from legato.hal.faults import Cause
+from legato.hal.faults import Cause, DeviceError
 from legato.records.errors import RecordError
 from legato.records.session import SessionWriter
 from legato.records.trajectory import trajectory_row
@@ -44,7 +45,6 @@ from legato.vision.picture import encode_png
 
 NAP_S = 0.1  # cell seconds between two looks at the interrupts while dwelling
 TELEMETRY_S = 0.05  # wall seconds between two looks that a running job gives of the arm
-EFFECTS_KEPT = 8  # told as evidence
 
 
 def carry_out(
@@ -81,8 +81,6 @@ class Performer:
         post: Callable[[Message], None],
         wall: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.last_effects: deque[str] = deque(maxlen=EFFECTS_KEPT)
-        self.last_picture: str | None = None
         self._devices = devices
         self._settings = settings
         self._writer = writer
@@ -92,19 +90,22 @@ class Performer:
         self._told_at = -TELEMETRY_S
         self._station: float | None = None
         self._written = False  # a row of the trajectory
+        orders.trail.begin(devices.cell.arm)
+        if devices.memory.calibration is not None:
+            self._note_residuals(devices.memory.calibration)
 
     def perform(self, effect: Effect) -> Any:
         """Carry out one effect and return its result."""
-        self.last_effects.append(_told(effect))
+        self._orders.trail.add(_told(effect))
         match effect:
             case Enter(state):
                 return self._enter(state)
             case Grab(name):
                 return self._grab(name)
-            case Find(frame):
-                return self._find(frame)
-            case Solve(frame):
-                return self._solve(frame)
+            case Find():
+                return self._find(effect)
+            case Solve():
+                return self._solve(effect)
             case Move():
                 return self._move(effect)
             case ReadArm():
@@ -129,19 +130,37 @@ class Performer:
             raise RuntimeError(f"the procedure wanted to enter {state}, which the table forbids")
 
     def _grab(self, name: str) -> Frame:
-        frame = self._devices.grab()
-        self.last_picture = self._writer.frame(name, encode_png(frame.image))
+        """Take a picture; a camera whose trouble may pass is opened anew and asked again."""
+        clock = self._devices.cell.clock
+        patience = Patience(clock.monotonic(), self._wall())
+        while True:
+            try:
+                frame = self._devices.grab()
+                break
+            except DeviceError as error:
+                pause = patience.pause(error, clock.monotonic(), self._wall())
+                self._post(Happened(self._writer.id, "progress", patience.told(error, pause)))
+            self._dwell(pause)
+        self._orders.trail.note(picture=self._writer.frame(name, encode_png(frame.image)))
         return frame
 
-    def _find(self, frame: Frame) -> Picking:
-        return find_marks_in(frame.image, self._settings, seed=self._settings.calibration.seed)
+    def _find(self, find: Find) -> Picking:
+        seed = self._settings.calibration.seed
+        return find_marks_in(find.frame.image, self._settings, seed=seed, picks=find.picks)
 
-    def _solve(self, frame: Frame) -> Calibration:
-        began = self._wall()
-        solved = perceive(frame.image, self._settings, seed=self._settings.calibration.seed)
+    def _solve(self, solve: Solve) -> Calibration:
+        began, frame, seed = self._wall(), solve.frame, self._settings.calibration.seed
+        solved = perceive(
+            frame.image, self._settings, seed=seed, picks=solve.picks, now_s=time.time()
+        )
         self._devices.solved = frame, self._wall() - began
         self._devices.calibrated_at = self._devices.cell.clock.monotonic()
+        self._note_residuals(solved)
         return solved
+
+    def _note_residuals(self, solved: Calibration) -> None:
+        residuals = residuals_told(solved, self._settings)
+        self._orders.trail.note(residuals=residuals, rms_px=solved.solution.rms_px)
 
     def _move(self, move: Move) -> ArmReading:
         """Check, send, and compare what the arm says with what it was told."""
@@ -229,7 +248,8 @@ class Performer:
         now = self._wall()
         if now - self._told_at < TELEMETRY_S and not paused:
             return
-        self._told_at = now
+        # From when it was due, not from when it came: else motions' lengths would thin it out.
+        self._told_at = max(self._told_at + TELEMETRY_S, now - TELEMETRY_S)
         view = self._devices.view()
         data = {"arm": dict(view.arm), "station_mm": self._station, "why": why}
         self._post(Moved(self._writer.id, view, data))

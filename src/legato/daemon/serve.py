@@ -4,20 +4,19 @@ import secrets
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import zmq
+from msgspec import to_builtins
 
 from legato import __version__
 from legato.config.build import cell_settings
 from legato.daemon.cell import build_cell, build_clock
 from legato.daemon.conductor import Conductor
-from legato.daemon.desk import Desk
 from legato.daemon.doorman import Doorman
 from legato.daemon.events import Events
 from legato.daemon.journal import Journal
@@ -32,26 +31,32 @@ from legato.daemon.sessions import Sessions
 from legato.daemon.sockets import Sockets
 from legato.daemon.standing import Setting, Standing
 from legato.daemon.stopline import StopLine
+from legato.daemon.tidy import Tidy
+from legato.daemon.watching import Watching
 from legato.daemon.worker import Worker
 from legato.records.errors import RecordError
 from legato.records.store import Store
 
 if TYPE_CHECKING:
     from legato.config.load import Loaded
-    from legato.config.schema import ServerTable
+    from legato.config.schema import RecordsTable, ServerTable
+    from legato.daemon.worker import Procedures
 
 SWITCH_S = 0.0005  # Python's own thread switch: the loop answers while the worker computes
 JOIN_S = 5.0
 
 
-def serve(loaded: "Loaded", log: Log | None = None) -> int:
-    """Run the daemon until shutdown or a signal; return the process's exit code."""
+def serve(loaded: "Loaded", log: Log | None = None, procedures: "Procedures | None" = None) -> int:
+    """Run the daemon until shutdown or a signal; return the process's exit code.
+
+    `procedures` are what its jobs do, by default what control.jobs says.
+    """
     log = log if log is not None else make_log()
     sys.setswitchinterval(SWITCH_S)
     state_dir = Path(loaded.config.records.state_dir)
     try:
         with only_instance(state_dir):
-            return _serve(loaded, Store(state_dir), log)
+            return _serve(loaded, Store(state_dir), log, procedures)
     except AlreadyRunning as error:
         log.error("already_running", text=str(error), hint="stop it first")
     except RecordError as error:
@@ -66,7 +71,7 @@ def serve(loaded: "Loaded", log: Log | None = None) -> int:
     return 1
 
 
-def _serve(loaded: "Loaded", store: Store, log: Log) -> int:
+def _serve(loaded: "Loaded", store: Store, log: Log, procedures: "Procedures | None" = None) -> int:
     """Run the daemon whose state folder is locked."""
     config = loaded.config
     settings = cell_settings(loaded)
@@ -75,6 +80,7 @@ def _serve(loaded: "Loaded", store: Store, log: Log) -> int:
     doorman = _doorman(config.server, mailbox)
     past = read_past(store, log, arm=arm_name(config.robot))
     server = config.server
+    watching = Watching(config, store, log)
     sockets = Sockets(server.requests, server.events, server.stop, doorman)
     stopline = StopLine(
         sockets.stop,
@@ -93,12 +99,12 @@ def _serve(loaded: "Loaded", store: Store, log: Log) -> int:
             boot=boot,
             clock=clock.monotonic,
             min_free_mb=config.records.min_free_mb,
-            meta={"config_hash": loaded.hash, "config": loaded.data},
+            meta=_meta(loaded),
         )
-        conductor = _conductor(setting, orders, store, past, events, log)
+        conductor = _conductor(setting, orders, store, past, events, log, watching)
         stopline.start()
-        desk = Desk(conductor, events, settings, sockets.send, log, stopline.told)
-        keep_days = config.records.keep_days
+        desk = watching.desk(conductor, events, settings, sockets.send, log, stopline.told)
+        watching.begin(conductor, desk, stopline)
         worker = Worker(
             lambda: build_cell(loaded, clock),
             settings,
@@ -106,19 +112,23 @@ def _serve(loaded: "Loaded", store: Store, log: Log) -> int:
             mailbox.put,
             log,
             last=past.last,
-            tidy=lambda: store.prune(keep_days, datetime.now(UTC)),
+            procedures=procedures,
+            tidy=_tidy(config.records, store, log),
+            pulse=watching.pulse,
+            timed=watching.counts.timed,
         )
         ends = sockets.endpoints
-        ready = partial(log.info, "ready", boot=boot, **ends)
+        ready = partial(_ready, watching, partial(log.info, "ready", boot=boot, **ends))
         listening = partial(log.info, "listening", version=__version__, boot=boot, **ends)
         loop = Loop(sockets, mailbox, conductor, desk, events, ready, listening)
-        with _signals(mailbox) as ending:
+        with _signals(mailbox, watching.stopping) as ending:
             worker.start()
             try:
                 loop.run(lambda: bool(ending))
             except BaseException:
                 orders.drop()  # a bug in the loop must not leave the arm moving on
                 raise
+        watching.stopping()
         desk.close()
         log.info("ended", clean=worker.join(JOIN_S))
         return conductor.exit_code
@@ -126,6 +136,30 @@ def _serve(loaded: "Loaded", store: Store, log: Log) -> int:
         stopline.end()
         sockets.close()
         mailbox.close()
+        watching.close()
+
+
+def _ready(watching: Watching, log_it: Callable[[], None]) -> None:
+    """Tell log and systemd that both devices are known, or known to be missing."""
+    log_it()
+    watching.ready()
+
+
+def _tidy(records: "RecordsTable", store: Store, log: Log) -> Tidy:
+    """Return what removes old records."""
+    return Tidy(
+        store,
+        log,
+        keep_days=records.keep_days,
+        keep_newest=records.keep_sessions,
+        min_free_mb=records.min_free_mb,
+    )
+
+
+def _meta(loaded: "Loaded") -> dict[str, Any]:
+    """Return what every record says of the configuration; it is enough to replay it."""
+    lens = to_builtins(loaded.intrinsics) if loaded.intrinsics is not None else None
+    return {"config_hash": loaded.hash, "config": loaded.data, "intrinsics": lens}
 
 
 def _doorman(server: "ServerTable", mailbox: Mailbox) -> Doorman | None:
@@ -143,22 +177,26 @@ def _conductor(
     past: Past,
     events: Events,
     log: Log,
+    watching: Watching,
 ) -> Conductor:
     """Return the conductor in idle, or in the fault that the past has left."""
     sessions = Sessions(store, past.sessions)
-    journal = Journal(sessions, events, store, setting.clock, log, past.last, past.arm)
+    journal = Journal(
+        sessions, events, store, setting.clock, log, past.last, past.arm, watching.heard
+    )
     now = time.monotonic()
     standing = Standing(setting, sessions, journal, log, now=now, fault=past.fault)
     return Conductor(setting, standing, journal, orders, store, log)
 
 
 @contextmanager
-def _signals(mailbox: Mailbox) -> Iterator[list[int]]:
-    """Collect SIGTERM and SIGINT in a list, each waking the loop."""
+def _signals(mailbox: Mailbox, told: Callable[[], None]) -> Iterator[list[int]]:
+    """Collect SIGTERM and SIGINT in a list, each waking the loop after `told` was called."""
     came: list[int] = []
 
     def collect(number: int, frame: Any) -> None:  # noqa: ARG001  # the signature is signal's
         came.append(number)
+        told()
 
     before = {n: signal.signal(n, collect) for n in (signal.SIGTERM, signal.SIGINT)}
     wake = signal.set_wakeup_fd(mailbox.wake_fileno(), warn_on_full_buffer=False)

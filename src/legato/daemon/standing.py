@@ -6,6 +6,7 @@ text and time stay until `clear`.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 from legato.control.settings import CellSettings
@@ -53,7 +54,7 @@ class Standing:
         self._journal = journal
         self._log = log
         self._machine = CellMachine(setting.settings.stations, FAULT if fault else IDLE)
-        self._entered_at = now
+        self._entered(now)
         self.beat_at = now
         cause = self.fault["cause"] if self.fault else "start"
         journal.tell("state", {"state": self.state, "previous": None, "cause": cause})
@@ -78,8 +79,7 @@ class Standing:
     @property
     def due(self) -> float:
         """When the state's deadline is; infinity where it has none."""
-        limit = deadline(self.state)
-        return float("inf") if limit is None else self._entered_at + limit
+        return self._due
 
     @property
     def uptime_s(self) -> float:
@@ -107,24 +107,42 @@ class Standing:
         previous = self.state
         if not self._machine.enter(state):
             return
-        self._entered_at = self.now
+        self._entered(self.now)
         change = {"state": state, "previous": previous, "cause": cause}
         change |= {"by": by} if by is not None else {}
         self._log.info("state", **change)
         self._journal.tell("state", change, durable=True)
 
+    def _entered(self, now: float) -> None:
+        limit = deadline(self.state)
+        self._entered_at, self._due = now, now + limit if limit is not None else inf
+
     def begin(
-        self, job: str, key: str | None, by: str, versions: Mapping[str, str], state: str
+        self,
+        job: str,
+        key: str | None,
+        by: str,
+        versions: Mapping[str, str],
+        state: str,
+        params: Mapping[str, Any] | None = None,
     ) -> Session:
-        """Begin a session in the job's first state. Raises RecordError: then nothing has begun."""
+        """Begin a session in the job's first state. Raises RecordError: then nothing has begun.
+
+        Of `params`, `campaign` is not the request's: it names the campaign that has begun it.
+        """
+        params = dict(params or {})
+        part = {"campaign": params.pop("campaign")} if "campaign" in params else {}
         meta = dict(self._setting.meta) | {
             "boot": self._setting.boot,
             "by": by,
+            "params": params,
+            **part,
             "simulated": self._setting.settings.simulated,
             "versions": dict(versions),
         }
         session = self.sessions.begin(job, key, meta)
-        self._journal.tell("session", _told(session), durable=True)
+        # The state's line, right behind it, brings both to the disk.
+        self._journal.tell("session", _told(session))
         self.enter(state, job, by)
         return session
 
@@ -187,6 +205,7 @@ class Standing:
             return
         self.beat_at = max(self.beat_at + HEARTBEAT_S, self.now)
         self.sessions.seal()
+        self._journal.keep_again()
         self._journal.publish("heartbeat", {"state": self.state, "uptime_s": self.uptime_s})
 
     def keep(self) -> None:

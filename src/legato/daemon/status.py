@@ -1,11 +1,12 @@
 """What `status` and `describe` answer, made from what the loop knows."""
 
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from typing import Any
 
 from legato import __version__
 from legato.control.settings import CellSettings
-from legato.control.states import deadline, massage_state, states
+from legato.control.states import deadline, massage_state, rows, states
 from legato.control.table import ROLES, describe_table
 from legato.daemon.messages import View
 from legato.daemon.sessions import Session
@@ -23,6 +24,7 @@ def describe(stations: Iterable[float]) -> dict[str, Any]:
         "methods": describe_methods(),
         "stop_line": describe_methods(STOP_LINE),
         "states": list(states(stations)),
+        "transitions": [list(row) for row in rows(stations)],
         "deadlines_s": {s: deadline(s) for s in states(stations)},
         "table": describe_table(stations),
         "fault_causes": [str(c) for c in Cause],
@@ -83,6 +85,7 @@ def camera_told(view: View, now: float) -> dict[str, Any]:
     return {"connected": view.camera_connected, "age_s": age}
 
 
-def station_of(state: str, stations: Iterable[float]) -> float | None:
+@lru_cache(maxsize=64)
+def station_of(state: str, stations: tuple[float, ...]) -> float | None:
     """Return the station that a massage state is at."""
     return next((s for s in stations if massage_state(s) == state), None)

@@ -1,7 +1,9 @@
 """Requests that are answered later: kept by what they wait for and until when, never blocking."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from math import inf
+
+from msgspec import Struct
 
 from legato.daemon.who import Who
 from legato.wire.jsonrpc import Call
@@ -13,8 +15,7 @@ What = tuple[str, str | int]
 DEVICES: What = ("devices", 0)
 
 
-@dataclass(frozen=True)
-class Ask:
+class Ask(Struct, frozen=True):
     """A request with who asks; it came after the gate's first `since` stops."""
 
     call: Call
@@ -22,8 +23,7 @@ class Ask:
     since: int
 
 
-@dataclass(frozen=True)
-class Waiter:
+class Waiter(Struct, frozen=True):
     """One request; at `due` (monotonic s) it is answered as it then stands."""
 
     ask: Ask
@@ -60,9 +60,11 @@ class Waiters:
 
     def next_due(self) -> float:
         """Return when the next one's time is up, infinity where none waits."""
-        return min((w.due for w in self._waiting), default=float("inf"))
+        return min(w.due for w in self._waiting) if self._waiting else inf
 
     def _taken(self, fits: Callable[[Waiter], bool]) -> list[Waiter]:
+        if not self._waiting:
+            return []
         taken = [w for w in self._waiting if fits(w)]
         self._waiting = [w for w in self._waiting if not fits(w)]
         return taken

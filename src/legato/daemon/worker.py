@@ -5,9 +5,10 @@ a job's own effects.
 """
 
 import ctypes
+import gc
 import platform
+import sys
 import threading
-import time
 import traceback
 from collections.abc import Callable, Generator
 from importlib import metadata
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from legato import __version__
 from legato.control.effects import CellFault, Effect, Refused, StopRequested
 from legato.control.settings import CellSettings
+from legato.control.tape import taped
 from legato.daemon.cell import Cell
 from legato.daemon.log import Log
 from legato.daemon.messages import (
@@ -28,9 +30,9 @@ from legato.daemon.messages import (
     WorkerGone,
 )
 from legato.daemon.orders import DoJob, DoReference, DoReset, Dropped, Orders, Quit
+from legato.daemon.pulse import TASK_S, WAITING_S, Pulse
 from legato.geometry.arm import Unreachable
 from legato.geometry.motion import Steps
-from legato.hal.arm import Traced
 from legato.hal.faults import Cause, DeviceError
 from legato.records.errors import RecordError
 
@@ -39,8 +41,8 @@ if TYPE_CHECKING:
     from legato.daemon.devices import Devices
     from legato.daemon.perform import Performer
 
-TIDY_S = 86400.0  # between two clean-ups of old records
 LOOK_S = 1.0  # between two looks at the idle arm
+PICKING = ("run", "calibrate")  # jobs that find the leg anew
 RETRIES = (2, 30)  # looks between two attempts to open what is missing, doubling
 
 Procedures = Callable[[str, CellSettings, "Memory", float], Generator[Effect, Any, str]]
@@ -49,7 +51,8 @@ Procedures = Callable[[str, CellSettings, "Memory", float], Generator[Effect, An
 class Worker:
     """One thread over one cell.
 
-    `last` is the reference and the registers recorded before; `tidy` removes old records.
+    `last` is the reference and the registers recorded before; `tidy` removes old records, `pulse`
+    hears that the worker lives, `timed` how long each effect took.
     """
 
     def __init__(
@@ -64,6 +67,8 @@ class Worker:
         procedures: Procedures | None = None,
         tidy: Callable[[], object] = lambda: None,
         look_s: float = LOOK_S,
+        pulse: Pulse | None = None,
+        timed: Callable[[str, float], None] = lambda _, __: None,
     ) -> None:
         self._make_cell = make_cell
         self._settings = settings
@@ -73,8 +78,10 @@ class Worker:
         self._last = last
         self._procedures = procedures
         self._tidy = tidy
-        self._tidied_at: float | None = None
         self._look_s = look_s
+        self._modules = 0
+        self._pulse = pulse if pulse is not None else Pulse()
+        self._timed = timed
         self._thread = threading.Thread(target=self._run, name="worker", daemon=True)
 
     def start(self) -> None:
@@ -108,6 +115,7 @@ class Worker:
                 self._log.warning("missing", cause=problem.cause, text=problem.text)
             self._tidy_up()
             self._post(DevicesKnown(devices.view(), _versions()))
+            self._let_be()
             while self._serve(devices):
                 pass
         finally:
@@ -117,8 +125,11 @@ class Worker:
         """Perform the next task, or look at the devices where there is none; False to end."""
         wait, looks = RETRIES[0], 0
         while True:
-            match self._orders.next_task(self._look_s):
-                case DoJob() as task:
+            self._pulse.promise("waiting", self._look_s + WAITING_S)
+            task = self._orders.next_task(self._look_s)
+            self._pulse.promise("looking" if task is None else type(task).__name__, TASK_S)
+            match task:
+                case DoJob():
                     self._job(task, devices)
                     return True
                 case DoReference(token, pose):
@@ -143,14 +154,11 @@ class Worker:
             devices.look()
         except Exception:  # noqa: BLE001  # looking at a device must never end the worker
             self._log.error("bug", traceback=traceback.format_exc())
+        self._tidy_up()
         self._post(Looked(devices.view()))
 
     def _tidy_up(self) -> None:
-        """Remove old records once a day; only while no session can begin."""
-        now = time.monotonic()
-        if self._tidied_at is not None and now - self._tidied_at < TIDY_S:
-            return
-        self._tidied_at = now
+        """Remove old records where that is due."""
         try:
             self._tidy()
         except RecordError as error:
@@ -186,17 +194,32 @@ class Worker:
         self._tidy_up()
         self._post(JobEnded(task.session, outcome, reason, cause, fault, devices.view()))
         _give_back()
+        self._let_be()
+
+    def _let_be(self) -> None:
+        """Take what has been loaded out of the collector's sight.
+
+        Python stops every thread, the stop line's too, while it looks through all there is: 40 ms.
+        """
+        if len(sys.modules) != self._modules:
+            self._modules = len(sys.modules)
+            gc.freeze()
 
     def _outcome(
         self, task: DoJob, devices: "Devices", performer: "Performer"
     ) -> tuple[str | None, str | None, Cause | None, FaultReport | None]:
         """Run a job's procedure; return outcome, reason, cause and fault, whatever it meets."""
         from legato.daemon.perform import carry_out
+        from legato.daemon.tape import JobTape, write_start
 
         assert self._procedures is not None
+        if task.job in PICKING:
+            devices.memory.picks = task.params.get("picks")
         try:
             now = devices.cell.clock.monotonic()
+            write_start(task.writer, task.job, devices, now)
             work = self._procedures(task.job, self._settings, devices.memory, now)
+            work = taped(work, JobTape(task.writer, self._pulse, self._timed))
             return carry_out(work, performer.perform, self._orders), None, None, None
         except Dropped:
             return None, None, None, None
@@ -216,13 +239,7 @@ class Worker:
             text = f"{type(error).__name__}: {error}"
             hint = "report it with the record of this session"
             fault = FaultReport(Cause.INTERNAL, text, hint, {"traceback": told})
-        arm = devices.cell.arm
-        evidence = {
-            "last_effects": list(performer.last_effects),
-            "last_bytes": list(arm.last_bytes) if isinstance(arm, Traced) else [],
-            "picture": performer.last_picture,
-            **fault.evidence,
-        }
+        evidence = self._orders.trail.evidence() | dict(fault.evidence)
         fault = FaultReport(fault.cause, fault.text, fault.hint, evidence)
         return "fault", fault.text, fault.cause, fault
 

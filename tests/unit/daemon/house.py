@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,7 @@ class House:
     fault: dict[str, Any] | None = None
     min_free_mb: float = 0.0
     now: float = 100.0
+    wall: Callable[[], datetime] = lambda: datetime.now(UTC)
     replies: list[tuple[bytes, dict[str, Any]]] = field(default_factory=list)
     events: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
     calls: int = 0
@@ -59,7 +61,7 @@ class House:
         self.store = Store(self.folder)
         self.published = Events("boot", lambda: self.now, self._publish)
         setting = Setting(settings(), "boot", lambda: self.now, self.min_free_mb, {"config": {}})
-        self.sessions = Sessions(self.store, self.store.sessions())
+        self.sessions = Sessions(self.store, self.store.sessions(), self.wall)
         journal = Journal(self.sessions, self.published, self.store, setting.clock, self.log)
         standing = Standing(
             setting, self.sessions, journal, self.log, now=self.now, fault=self.fault

@@ -1,13 +1,18 @@
 """The cell: drivers by configuration alone, one world for a simulated arm and camera."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 import pytest
+from msgspec import structs
 
 from legato.config.load import Loaded
-from legato.config.schema import CameraTable, CellTable, Config, RobotTable
+from legato.config.schema import CameraTable, CellTable, Config, RobotTable, SimTable
 from legato.daemon.cell import WallClock, build_cell, build_clock
+from legato.drivers.faulty.arm import FaultyArm, FaultyTracedArm, FaultyWitnessArm
+from legato.drivers.faulty.camera import FaultyCamera
+from legato.drivers.faulty.settings import FaultSettings
 from legato.drivers.opencv import OpenCVCamera
 from legato.drivers.sim.arm import SimArm
 from legato.drivers.sim.camera import SimCamera
@@ -41,6 +46,24 @@ def test_drivers_follow_the_configuration(
     assert (cell.witness is not None) == (robot == "sim")
     assert (cell.stands_at is not None) == (robot == "sim")
     assert cell.simulated == (robot == "sim")
+
+
+@pytest.mark.parametrize(
+    ("robot", "arm_type"), [("sim", FaultyWitnessArm), ("teachmover", FaultyTracedArm)]
+)
+def test_faults_strike_whatever_drivers_there_are(robot: Any, arm_type: type[FaultyArm]) -> None:
+    """Only the device that a fault is of is wrapped, and the witness stays the world's own."""
+    given = loaded(robot, "sim")
+
+    def with_fault(kind: Any) -> Any:
+        sim = SimTable(faults=(FaultSettings(kind=kind, call=1),))
+        return build_cell(replace(given, config=structs.replace(given.config, sim=sim)))
+
+    arm, camera = with_fault("arm_lost"), with_fault("blank")
+    assert (type(arm.arm), type(arm.camera)) == (arm_type, SimCamera)
+    assert (isinstance(camera.arm, FaultyArm), type(camera.camera)) == (False, FaultyCamera)
+    assert arm.simulated == (robot == "sim")
+    assert arm.witness is None or isinstance(arm.witness, SimArm)
 
 
 def test_a_clock_handed_in_is_the_cells() -> None:

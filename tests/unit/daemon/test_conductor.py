@@ -305,6 +305,18 @@ def test_a_disk_that_fails_in_a_job_is_a_fault(house: House) -> None:
     assert house.result("session", session=session)["outcome"] == "fault"
 
 
+def test_a_fault_that_the_disk_did_not_keep_is_kept_once_it_can_be(house: House) -> None:
+    """What the next start must know is tried again with each heartbeat, changed or not."""
+    way = house.folder / ".state.json.tmp"
+    way.mkdir()
+    house.result("estop")
+    assert house.store.load_state()["fault"] is None
+    house.pass_time(1.1)
+    way.rmdir()
+    house.pass_time(1.1)
+    assert house.store.load_state()["fault"]["cause"] == "estop"
+
+
 def test_a_stop_that_came_with_the_last_effect_is_a_stop(house: House) -> None:
     """A job that was told to stop ends as stopped, though it had nothing left to do."""
     session = house.begin("home")
@@ -332,7 +344,7 @@ def test_status_has_the_designs_keys(house: House) -> None:
     status = house.result("status")
     assert list(status) == [
         "api", "version", "boot", "simulated", "state", "session", "station", "progress",
-        "uptime_s", "arm", "camera", "calibration", "fault", "lease", "stop",
+        "uptime_s", "arm", "camera", "calibration", "fault", "lease", "stop", "campaign",
     ]  # fmt: skip
     assert list(status["arm"]) == [
         "connected", "referenced", "xyz_mm", "pitch_deg", "roll_deg", "contact",

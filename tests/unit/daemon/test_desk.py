@@ -53,7 +53,7 @@ def test_every_method_has_the_tables_answer(tmp_path: Path, state: str) -> None:
     """For each pair of state and method the daemon refuses exactly what the table refuses."""
     needed: dict[str, dict[str, Any]] = {
         "wait": {"session": "none"}, "session": {"session": "none"},
-        "events_since": {"boot": "boot", "seq": 0},
+        "events_since": {"boot": "boot", "seq": 0}, "campaign": {"count": 1},
     }  # fmt: skip
     for method in METHODS:
         house = House(tmp_path / method).known()

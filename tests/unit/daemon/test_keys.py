@@ -58,6 +58,22 @@ def test_systemds_credentials_are_read_as_they_come(
     assert read_secret(secret, "server.curve.secret").secret
 
 
+def test_a_credential_stands_before_a_file_of_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The configuration names keys/server.secret; under systemd that is the credential's copy."""
+    configured, _ = make_keys(tmp_path / "keys", "server", "server")
+    given, _ = make_keys(tmp_path / "credentials", "server", "server")
+    monkeypatch.setenv("CREDENTIALS_DIRECTORY", str(tmp_path / "credentials"))
+    own = read_secret(given, "server.curve.secret")
+    assert read_secret(configured, "server.curve.secret").public == own.public
+    configured.unlink()
+    assert read_secret(configured, "server.curve.secret").public == own.public
+    given.unlink()
+    with pytest.raises(ConfigError, match=r"server\.secret"):
+        read_secret(configured, "server.curve.secret")
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [('secret = "', 'secret = "0'), ('name = "', 'nom = "'), ("secret = ", "# secret = ")],

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from legato.daemon.lock import AlreadyRunning, only_instance
+from legato.daemon.lock import AlreadyRunning, look, only_instance
 
 HOLD = """
 import sys
@@ -29,6 +29,17 @@ def test_a_second_one_is_refused_with_the_first_ones_process(tmp_path: Path) -> 
     ):
         pass
     with only_instance(folder):
+        pass
+
+
+def test_a_look_tells_who_is_there_and_leaves_nothing(tmp_path: Path) -> None:
+    """Without a lock or a holder it is silent, and it holds and makes nothing."""
+    look(tmp_path / "nowhere")
+    assert not (tmp_path / "nowhere").exists()
+    with only_instance(tmp_path), pytest.raises(AlreadyRunning, match=str(os.getpid())):
+        look(tmp_path)
+    look(tmp_path)
+    with only_instance(tmp_path):
         pass
 
 

@@ -33,3 +33,18 @@ def test_a_terminal_gets_colours() -> None:
     make_log(out).info("ready", requests="tcp://127.0.0.1:5760")
     assert "\x1b[" in out.getvalue()
     assert "ready" in out.getvalue()
+
+
+def test_a_line_that_nobody_takes_is_lost() -> None:
+    """A full disk behind stderr, or a reader that has gone, stops no daemon."""
+
+    class Full(io.StringIO):
+        def write(self, _: str) -> int:
+            raise OSError(28, "No space left on device")
+
+    log = make_log(Full())
+    log.info("state", state="idle")
+    log.error("fault", cause="disk")
+    closed = io.StringIO()
+    closed.close()
+    make_log(closed).warning("turned_away")

@@ -141,6 +141,17 @@ def test_junk_on_the_events_socket_does_no_harm(served: Served) -> None:
     assert served.answer(served.client(zmq.REQ), ping())["result"]["state"] == "idle"
 
 
+def test_a_subscription_that_names_no_topic_is_not_kept(served: Served) -> None:
+    """For each letter of one libzmq keeps memory: what no topic begins with is junk, or cut off."""
+    talker = served.context.socket(zmq.XSUB)
+    talker.linger = 0
+    talker.connect(served.sockets.endpoints["events"])
+    served.clients.append(talker)
+    talker.send(b"\x01nothing")
+    assert served.turn_until(lambda: served.house.desk.junk >= 1)
+    assert int(served.sockets.events.getsockopt(zmq.MAXMSGSIZE)) < 2000
+
+
 def test_a_new_subscriber_gets_the_latest_of_each_topic(served: Served) -> None:
     """Late as it is, it knows the state and the last heartbeat at once."""
     session = served.house.begin("home")
