@@ -1,0 +1,80 @@
+// What must not be overlooked: a lost line, a fault, a page that cannot act.
+
+import { act, against, mayAct, onRights } from "./acts.js";
+import { $, clock, day, fill, h, marked, say } from "./dom.js";
+import { known, on } from "./live.js";
+import { startMarking } from "./marking.js";
+
+const boxes = { line: h("div"), fault: h("div"), rights: h("div") };
+fill($("alerts"), Object.values(boxes));
+let announced = "";
+
+on("line", () => {
+  const line = document.body.dataset.line;
+  const since = known.line?.since;
+  const what = {
+    lost: ["No connection to the daemon", known.line?.reason, known.line?.hint],
+    cut: ["No connection to this page\u2019s server", "legato web has ended, or this machine is busy", "start it again; this page finds it by itself"],
+    silent: ["Nothing is heard", "the page\u2019s server says nothing", "see that legato web runs"],
+  }[line];
+  fill(boxes.line, what && h("section", { class: "alert lost", "aria-label": "Connection" },
+    h("h2", {}, what[0]),
+    h("p", {}, "All that is shown below is old",
+      line === "lost" && since ? `: the last was heard at ${clock(since)}. ` : ". ",
+      "The cell may be moving. Use the hardware stop if in doubt."),
+    h("p", { class: "note" }, marked([what[1], what[2]].filter(Boolean).join("; ")))));
+  if (what) urgent(`${what[0]}. What is shown is old.`);
+  else if (line === "up" && announced.startsWith("No connection")) urgent("Connected again.");
+});
+
+on("fault state line", () => {
+  const fault = known.state?.state === "fault" ? known.fault : null;
+  if (!fault) return fill(boxes.fault);
+  const evidence = Object.entries(fault.evidence ?? {}).filter(([, v]) => !empty(v));
+  const handle = (text, click, no) =>
+    h("button", { type: "button", class: text === "Reset" ? "plain first" : "plain", "aria-disabled": no !== null, title: no ?? "", onclick: click }, text);
+  fill(boxes.fault, h("section", { class: "alert fault", "aria-labelledby": "h-fault" },
+    h("h2", { id: "h-fault" }, h("code", {}, fault.cause), " ", fault.text),
+    h("p", {}, h("strong", {}, "What to do: "), marked(fault.hint)),
+    h("p", { class: "note" }, `Since ${day(fault.since)}`,
+      fault.session && [", in session ", report(fault.session)]),
+    evidence.length > 0 && h("details", {},
+      h("summary", {}, "Evidence"),
+      h("dl", { class: "evidence" }, evidence.map(([name, value]) =>
+        [h("dt", {}, name.replaceAll("_", " ")), h("dd", {}, plain(value))]))),
+    h("div", { class: "row" },
+      handle("Reset", () => act("reset"), against("reset")),
+      fault.cause === "marks_not_found" &&
+        handle("Mark by hand", startMarking, mayAct() ? null : against("calibrate")))));
+  urgent(`Fault ${fault.cause}: ${fault.text}. What to do: ${fault.hint}`);
+});
+
+onRights(() => {
+  fill(boxes.rights, !mayAct() && h("p", { class: "alert quiet" }, against("run")));
+});
+
+export const report = (session, text) =>
+  h("a", { href: `/sessions/${session}/report`, target: "_blank", rel: "noopener" }, text ?? session);
+
+function urgent(text) {
+  announced = text;
+  say($("urgent"), text);
+}
+
+const empty = (value) => value === null || value === "" || (Array.isArray(value) && !value.length);
+
+function plain(value) {
+  if (Array.isArray(value)) {
+    const deep = value.some((v) => typeof v === "string" && v.length > 24);
+    return deep ? h("ul", {}, value.map((v) => h("li", {}, String(v)))) : value.map(short).join(", ");
+  }
+  if (value && typeof value === "object") {
+    return Object.entries(value).map(([k, v]) => `${k} ${Array.isArray(v) ? `(${v.map(short).join(", ")})` : short(v)}`).join("; ");
+  }
+  return short(value);
+}
+
+function short(value) {
+  if (value === null) return "not known";
+  return typeof value === "number" ? String(Number(value.toPrecision(5))) : String(value);
+}

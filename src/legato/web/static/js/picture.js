@@ -1,0 +1,95 @@
+// The camera's last picture, and over it what was found, what was predicted, and how far apart.
+
+import { report } from "./alerts.js";
+import { $, day, fill, fixed, h, s } from "./dom.js";
+import { known, on } from "./live.js";
+import { markingTools, marksLayer, onMarking, startMarking, watchPicture } from "./marking.js";
+
+const LAYERS = { leg: "Leg", marks: "Marks", residuals: "Residuals" };
+const shown = { leg: true, marks: true, residuals: true };
+
+fill($("layers"), Object.entries(LAYERS).map(([name, text]) =>
+  h("label", { class: "toggle" }, h("input", {
+    type: "checkbox", checked: shown[name],
+    onchange: (event) => { shown[name] = event.target.checked; draw(); },
+  }), text)));
+
+const image = h("img", { alt: "" });
+const over = s("svg", { "aria-hidden": "true" });
+const frame = h("div", { class: "frame" }, image, over);
+const tools = h("div");
+const text = h("div");
+fill($("picture"), frame, tools, text);
+watchPicture(frame);
+
+on("picture cell state table line", draw);
+onMarking(draw);
+
+function draw() {
+  const view = known.picture;
+  frame.hidden = !view;
+  if (!view) return fill(text, h("p", { class: "empty" }, "No picture yet. Send run or capture; pictures come from the records on this machine."));
+  const address = `/sessions/${view.session}/${view.name}`;
+  if (image.getAttribute("src") !== address) image.src = address;
+  image.alt = described(view);
+  over.setAttribute("viewBox", `0 0 ${view.size[0]} ${view.size[1]}`);
+  const marking = marksLayer();
+  // Pixel centres lie at whole numbers, the drawing's corner at the picture's.
+  fill(over, s("g", { transform: "translate(0.5 0.5)" }, marking ?? layers(view.solved)));
+  fill(tools, markingTools());
+  fill(text, caption(view));
+}
+
+function layers(solved) {
+  if (!solved) return [];
+  const path = (points) => points.map((p, k) => `${p && points[k - 1] ? "L" : "M"}${p ? p.join(" ") : ""}`).filter((d) => d.length > 1).join("");
+  return [
+    shown.leg && s("g", { class: "leg" },
+      solved.outline && s("path", { d: `${path(solved.outline)}Z` }),
+      solved.faces.map((ring) => s("path", { class: "thin", d: path(ring) })),
+      solved.stations.map((st) => [
+        s("path", { class: "dash", d: path(st.ring) }),
+        st.at && s("circle", { cx: st.at[0], cy: st.at[1], r: 5 }),
+        st.at && label(st.at, `${st.station_mm} mm`, 12, -12),
+      ])),
+    shown.marks && Object.entries(solved.marks).map(([name, mark]) => mark.seen
+      ? s("g", { class: "seen" }, cross(mark.seen, 9), label(mark.seen, name, 9, 20))
+      : mark.predicted && s("g", { class: "missed" }, saltire(mark.predicted, 6), label(mark.predicted, `${name} missing`, 9, 20))),
+    shown.residuals && Object.values(solved.marks).filter((m) => m.seen && m.residual).map((m) =>
+      arrow(m.seen, m.residual.map((v) => v * solved.magnified))),
+  ];
+}
+
+const cross = ([u, v], r) => s("path", { d: `M${u - r} ${v}H${u + r}M${u} ${v - r}V${v + r}` });
+const saltire = ([u, v], r) => s("path", { d: `M${u - r} ${v - r}L${u + r} ${v + r}M${u - r} ${v + r}L${u + r} ${v - r}` });
+const label = ([u, v], name, du, dv) => s("text", { x: u + du, y: v + dv }, name);
+
+function arrow([u, v], [du, dv]) {
+  const length = Math.hypot(du, dv);
+  if (length < 1) return null;
+  const [a, b] = [(du / length) * 7, (dv / length) * 7];
+  const [x, y] = [u + du, v + dv];
+  return s("path", { class: "residual", d: `M${u} ${v}L${x} ${y}M${x - a - b / 2} ${y - b + a / 2}L${x} ${y}L${x - a + b / 2} ${y - b - a / 2}` });
+}
+
+function caption(view) {
+  const solved = view.solved;
+  const missing = Object.entries(solved?.missing ?? {});
+  return [
+    h("p", { class: "note" }, view.simulated && "Simulated: ", `${view.name.replace("frames/", "")} of session `, report(view.session), `, ${day(view.started)}. `,
+      solved ? h("span", {}, h("strong", { class: solved.accepted ? "good" : "bad" }, solved.accepted ? "Accepted" : "Not accepted"),
+        `, residuals ${fixed(solved.rms_px, 3)} px rms, drawn ${solved.magnified} times as long.`)
+        : "Not solved: this is the picture as the camera gave it."),
+    h("p", { class: "legend", "aria-hidden": "true" },
+      h("span", { class: "k leg" }, "leg and stations, projected"), h("span", { class: "k seen" }, "marks, seen"), h("span", { class: "k residual" }, "predicted \u2212 seen")),
+    missing.length > 0 && h("p", { class: "note" }, "Missing: ", missing.map(([name, why]) => `${name} (${why})`).join("; "), "."),
+    solved?.reasons?.length > 0 && h("ul", { class: "bad" }, solved.reasons.map((r) => h("li", {}, r))),
+    h("p", {}, h("button", { type: "button", class: "plain", id: "mark", onclick: startMarking }, "Mark by hand")),
+  ];
+}
+
+function described(view) {
+  if (!view.solved) return "The camera\u2019s last picture; no leg was found in it.";
+  const seen = Object.values(view.solved.marks).filter((m) => m.seen).length;
+  return `The camera\u2019s picture of the leg: ${seen} of ${Object.keys(view.solved.marks).length} marks seen, residuals ${fixed(view.solved.rms_px, 3)} px rms.`;
+}
