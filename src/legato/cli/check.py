@@ -5,17 +5,23 @@ from datetime import UTC, datetime
 from legato.cli.command import Context, command
 from legato.cli.doctor import Finding, examine
 from legato.cli.exits import Exit
+from legato.cli.surroundings import around
 
 MARKS = {True: "ok", False: "NO", None: "look"}
+STYLES = {"ok": "green", "NO": "bold red", "look": "yellow"}
 
 
 @command("check")
 def check(context: Context) -> None:
-    """Look at configuration, intrinsics, reach, devices and disk; nothing is opened or moved."""
+    """Look at all that a session needs, and say what to do where something is wrong.
+
+    Configuration, keys, daemon, clock, intrinsics, reach, devices, disk. Nothing is moved; the
+    camera is asked for a picture where no daemon has it.
+    """
     from legato.config.load import load
 
-    loaded = load(context.config, need_intrinsics=False)
-    findings = list(examine(loaded, datetime.now(UTC)))
+    loaded, now = load(context.config, need_intrinsics=False), datetime.now(UTC)
+    findings = [*examine(loaded, now), *around(context, loaded, now)]
     show(context, findings)
     document = [{"name": f.name, "ok": f.ok, "text": f.text, "hint": f.hint} for f in findings]
     wrong = [f.name for f in findings if f.ok is False]
@@ -25,8 +31,14 @@ def check(context: Context) -> None:
 
 
 def show(context: Context, findings: list[Finding]) -> None:
-    """Show each finding to a person, and what to do where something is to be done."""
-    context.output.table(("", "", ""), [(MARKS[f.ok], f.name, f.text) for f in findings])
+    """Show each finding to a person, what to do right under it, and a verdict."""
+    rows = []
     for finding in findings:
+        rows.append((MARKS[finding.ok], finding.name, finding.text))
         if finding.ok is not True and finding.hint:
-            context.output.say(f"{finding.name}: what to do: {finding.hint}")
+            rows.append(("", "", f"what to do: {finding.hint}"))
+    context.output.table(("", "", ""), rows, styles=STYLES)
+    wrong = sum(f.ok is False for f in findings)
+    look = sum(f.ok is None for f in findings)
+    verdict = f"{wrong} to be put right" if wrong else "nothing stands in the way"
+    context.output.say(f"{verdict}, {look} worth a look" if look else verdict)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from legato.cli.examples import write_examples
 from legato.cli.exits import EPILOG, REFUSALS, Exit, Failure
 from legato.cli.output import Output, write_error
 
@@ -54,6 +55,11 @@ class LegatoCommand(click.Command):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         kwargs["epilog"] = "\n\n".join(filter(None, [kwargs.get("epilog"), EPILOG]))
         super().__init__(*args, **kwargs)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the command's examples, then what every command ends with."""
+        write_examples(ctx, formatter)
+        super().format_epilog(ctx, formatter)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; every error ends with a code of `Exit`."""

@@ -5,7 +5,7 @@ import os
 import pwd
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,17 @@ def examine(loaded: "Loaded", now: datetime) -> Iterator[Finding]:
     yield camera(loaded)
     yield state_dir(loaded)
     yield free_space(loaded)
+    yield from faults(loaded)
+
+
+def faults(loaded: "Loaded") -> Iterator[Finding]:
+    """Yield that devices will go wrong on schedule, where they will."""
+    found = loaded.config.sim.faults
+    if found:
+        real = loaded.config.robot.driver != "sim"
+        text = f"{len(found)} on schedule: {', '.join(fault.kind for fault in found)}"
+        hint = "take sim.faults out of this file before the arm does any work"
+        yield Finding("faults", False if real else None, text, hint)
 
 
 def intrinsics(loaded: "Loaded", now: datetime) -> Finding:
@@ -51,9 +62,11 @@ def intrinsics(loaded: "Loaded", now: datetime) -> Finding:
         hint = "calibrate the camera with `legato intrinsics` and name the file"
         text = "estimated anew from each picture, some twenty times less exact"
         return Finding("intrinsics", None, text, hint)
-    created = datetime.fromisoformat(found.created)
-    days = (now - (created if created.tzinfo else created.replace(tzinfo=UTC))).days
+    days, most = (now - found.dated()).days, loaded.config.camera.max_intrinsics_age_days
     text = f"{found.views} views, {found.rms_px:.3f} px rms, {days} days old"
+    if days > most:
+        hint = "calibrate the camera again, or set camera.max_intrinsics_age_days"
+        return Finding("intrinsics", False, f"{text}, {most:g} are allowed", hint)
     if days > OLD_DAYS:
         return Finding("intrinsics", None, text, "calibrate the camera again: mounts creep")
     return Finding("intrinsics", True, text)

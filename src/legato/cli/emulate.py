@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -65,6 +66,11 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
     type=click.Path(dir_okay=False, path_type=Path),
     help="Write what truly happened here at the end and at SIGUSR1.",
 )
+@click.option(
+    "--line",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write every chunk on the line here: monotonic seconds, > to the arm or < from it, bytes.",
+)
 def emulate(
     context: Context,
     time_scale: float,
@@ -73,6 +79,7 @@ def emulate(
     seed: int,
     link: Path | None,
     truth: Path | None,
+    line: Path | None,
 ) -> None:
     """Speak the TeachMover's protocol on a pseudo-terminal, over the simulated arm.
 
@@ -90,9 +97,9 @@ def emulate(
     stopping = threading.Event()
     arm, emulator = build(loaded, time_scale, int(baud) if baud else None, parsed, seed, stopping)
     told = Told(context, arm, emulator, link, truth)
-    with signals() as next_signal:
+    with signals() as next_signal, tapped(line) as passed:
         try:
-            run(told, stopping, next_signal)
+            run(told, passed, stopping, next_signal)
         finally:
             told.unlink()
 
@@ -197,14 +204,33 @@ class Told:
             self.context.output.say(f"breach: {breach['what']}")
 
 
-def run(told: Told, stopping: threading.Event, next_signal: Callable[[], int]) -> None:
+@contextmanager
+def tapped(file: Path | None) -> Iterator[Callable[[str, bytes], None]]:
+    """Give what writes each chunk on the line to a file, at once; nothing where there is none."""
+    if file is None:
+        yield lambda _, __: None
+        return
+    try:
+        stream = file.open("w", encoding="utf-8", buffering=1)
+    except OSError as error:
+        raise Failure(f"cannot write {file}: {error}", Exit.USAGE, "name another --line") from error
+    with stream:
+        yield lambda way, data: void(stream.write(f"{time.monotonic():.6f} {way} {data!r}\n"))
+
+
+def run(
+    told: Told,
+    passed: Callable[[str, bytes], None],
+    stopping: threading.Event,
+    next_signal: Callable[[], int],
+) -> None:
     """Serve the line on a thread of its own until a signal ends it; tell the truth at the end.
 
     SIGINT and SIGTERM end it, and at each SIGUSR1 the truth so far is told.
     """
     from legato.drivers.emulator import PseudoTerminal
 
-    with PseudoTerminal(told.emulator, told.port) as line:
+    with PseudoTerminal(told.emulator, told.port, passed) as line:
         thread = threading.Thread(target=line.serve, name="line")
         thread.start()
         try:

@@ -25,6 +25,8 @@ def line_of(topic: str, event: Mapping[str, Any]) -> str:
             outcome = event.get("outcome") or "begun"
             reason = f": {event['reason']}" if event.get("reason") else ""
             return f"{event.get('job')} {event.get('id')} {outcome}{reason}"
+        case "campaign":
+            return _campaign(event)
         case "telemetry":
             return _telemetry(event)
         case "heartbeat":
@@ -34,6 +36,21 @@ def line_of(topic: str, event: Mapping[str, Any]) -> str:
 
 
 HEAD = ("boot", "seq", "t", "session")
+
+
+def _campaign(event: Mapping[str, Any]) -> str:
+    """Return what a campaign has come to."""
+    of = f" of {event['total']}" if event.get("total") else ""
+    parts = [f"{event.get('what')} {event.get('id')}: {event.get('done')}{of} done"]
+    if event.get("failed"):
+        parts.append(f"{event['failed']} failed")
+    if event.get("next_in_s"):
+        parts.append(f"next in {_figure(event, 'next_in_s', '.0f')} s")
+    if event.get("outcome"):
+        parts.append(str(event["outcome"]))
+    if event.get("reason"):
+        parts.append(str(event["reason"]))
+    return ", ".join(parts)
 
 
 def _telemetry(event: Mapping[str, Any]) -> str:

@@ -1,6 +1,7 @@
 """`legato intrinsics`: calibrate the camera once, from ten or more pictures of the leg."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +21,12 @@ if TYPE_CHECKING:
 LEAST_MARKS = 7
 OUTLYING = 3.0  # times the median view's residual
 OUTLYING_PX = 1.0
+DOUBTED_PX = 0.1
+MOST_MARK_SIGMA = 5.0  # mm; beyond it a mark has no place at all
+MISFIT_HINT = (
+    "see that [leg] has this leg's measures and marks; for marks pasted on by hand "
+    "give --mark-sigma, such as 0.3"
+)
 HINT = "take at least ten sharp pictures with face and side in view, each from another pose"
 
 
@@ -32,7 +39,14 @@ HINT = "take at least ten sharp pictures with face and side in view, each from a
     type=click.Path(dir_okay=False, path_type=Path),
     help="The intrinsics file to write; name it in camera.intrinsics.",
 )
-def intrinsics(context: Context, images: tuple[Path, ...], file: Path) -> None:
+@click.option(
+    "--mark-sigma",
+    type=click.FloatRange(0.0, MOST_MARK_SIGMA),
+    default=0.0,
+    metavar="MM",
+    help="How exactly the marks were pasted on: their places are estimated too, about [leg.marks].",
+)
+def intrinsics(context: Context, images: tuple[Path, ...], file: Path, mark_sigma: float) -> None:
     """Calibrate the camera from IMAGES of the leg in ten or more poses, and write --out.
 
     A picture that cannot be used is named and left out; a file that is not there is an error.
@@ -41,24 +55,41 @@ def intrinsics(context: Context, images: tuple[Path, ...], file: Path) -> None:
     from legato.config.load import load
 
     loaded = load(context.config, need_intrinsics=False)
-    refuse_missing(images)
+    refuse_slips(images, file, mark_sigma)
     used, left_out = find_views(context, loaded, images)
-    result = calibrate(context, loaded, used, left_out)
+    result = calibrate(context, loaded, used, left_out, mark_sigma)
     if not result.converged or result.rms_px > loaded.config.calibration.max_rms_px:
         limit = loaded.config.calibration.max_rms_px
         text = f"the views fit one camera to {result.rms_px:.2f} px only, {limit:g} px allowed"
-        raise Failure(text, Exit.REFUSED, "see that [leg] has this leg's measures and marks")
-    created = datetime.now(UTC).isoformat(timespec="seconds")
-    write_intrinsics(file, result.known, views=len(used), rms_px=result.rms_px, created=created)
+        raise Failure(text, Exit.REFUSED, MISFIT_HINT)
+    write_intrinsics(
+        file,
+        result.known,
+        views=len(used),
+        rms_px=result.rms_px,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        view_rms_px=result.view_rms_px.tolist(),
+        mark_rms_px=mark_residuals(result, list(used.values())),
+        marks={n: p.tolist() for n, p in result.marks.items()} if mark_sigma > 0.0 else None,
+    )
     show(context, result, file, used, left_out)
+    doubt(context, mark_residuals(result, list(used.values())))
+    if mark_sigma > 0.0:
+        show_marks(context, result, dict(loaded.config.leg.marks))
 
 
-def refuse_missing(images: Sequence[Path]) -> None:
-    """Raise Failure for files that are not there: a slip of the pen, not a bad picture."""
+def refuse_slips(images: Sequence[Path], file: Path, mark_sigma: float) -> None:
+    """Raise Failure, before anything is computed, for what is a slip of the pen."""
     missing = [str(path) for path in images if not path.exists()]
     if missing:
         text = f"there is no file {', '.join(missing)}"
         raise Failure(text, Exit.USAGE, "see that every picture's name is right")
+    if not file.absolute().parent.is_dir():
+        raise Failure(f"--out {file}: there is no folder {file.parent}", Exit.USAGE)
+    if file.absolute() in {path.absolute() for path in images}:
+        raise Failure(f"--out {file} is one of the pictures", Exit.USAGE, "name another file")
+    if not math.isfinite(mark_sigma):
+        raise Failure(f"--mark-sigma {mark_sigma}: expected a length in mm", Exit.USAGE)
 
 
 def find_views(
@@ -110,29 +141,77 @@ def view_of(loaded: "Loaded", settings: "CellSettings", path: Path) -> "Problem"
 
 
 def calibrate(
-    context: Context, loaded: "Loaded", used: dict[Path, "Problem"], left_out: dict[Path, str]
+    context: Context,
+    loaded: "Loaded",
+    used: dict[Path, "Problem"],
+    left_out: dict[Path, str],
+    mark_sigma: float,
 ) -> "CalibratedViews":
-    """Return the intrinsics; views that do not fit the others leave `used` for `left_out`."""
+    """Return the intrinsics; views that misfit or repeat others leave `used` for `left_out`."""
     import numpy as np
 
     from legato.calibration.problem import CalibrationError
-    from legato.calibration.views import calibrate_views
+    from legato.calibration.views import calibrate_views, repeats
     from legato.config.build import engine_settings
 
     rng = np.random.default_rng(loaded.config.calibration.seed)
+    settings = engine_settings(loaded.config)
     while True:
         try:
-            result = calibrate_views(list(used.values()), engine_settings(loaded.config), rng)
+            result = calibrate_views(list(used.values()), settings, rng, mark_sigma)
         except CalibrationError as error:
             raise Failure(error.text, Exit.REFUSED, error.hint or HINT) from error
         limit = max(OUTLYING_PX, OUTLYING * float(np.median(result.view_rms_px)))
-        wrong = [p for p, rms in zip(used, result.view_rms_px, strict=True) if rms > limit]
+        paths, misfit = list(used), "does not fit the camera that the other pictures show"
+        same = repeats(result.poses)
+        wrong = {paths[i]: f"shows the leg just as {paths[k]} does" for i, k in same.items()}
+        wrong |= {p: misfit for p, r in zip(paths, result.view_rms_px, strict=True) if r > limit}
         if not wrong:
             return result
-        for path in wrong:
+        for path, why in wrong.items():
             del used[path]
-            left_out[path] = "does not fit the camera that the other pictures show"
+            left_out[path] = why
             context.output.note(f"{path}: {left_out[path]}")
+
+
+def mark_residuals(result: "CalibratedViews", views: Sequence["Problem"]) -> dict[str, float]:
+    """Return each mark's residual, px rms over u and v of all views."""
+    import numpy as np
+
+    squares: dict[str, list[float]] = {}
+    for view, off in zip(views, result.residuals, strict=True):
+        for name, pair in zip(view.names, off, strict=True):
+            squares.setdefault(name, []).extend((pair**2).tolist())
+    return {n: float(np.sqrt(np.mean(s))) for n, s in sorted(squares.items(), key=by_number)}
+
+
+def doubt(context: Context, residuals: Mapping[str, float]) -> None:
+    """Name the marks that fit much worse than the others: one of them may be misplaced."""
+    import numpy as np
+
+    limit = max(DOUBTED_PX, OUTLYING * float(np.median(list(residuals.values()))))
+    for name, rms in residuals.items():
+        if rms > limit:
+            context.output.note(f"{name} fits to {rms:.2f} px only: is it where [leg.marks] says?")
+
+
+def by_number(item: tuple[str, object]) -> tuple[int, str]:
+    """Return a key that puts P10 after P9."""
+    return len(item[0]), item[0]
+
+
+def show_marks(
+    context: Context, result: "CalibratedViews", given: Mapping[str, Sequence[float]]
+) -> None:
+    """Show where the marks are, and how far that is from where [leg.marks] has them."""
+    import numpy as np
+
+    rows = [
+        (n, *(f"{x:.3f}" for x in place), f"{float(np.linalg.norm(place - given[n])):.3f}")
+        for n, place in sorted(result.marks.items(), key=by_number)
+    ]
+    context.output.table(("mark", "x mm", "y mm", "z mm", "moved mm"), rows)
+    context.output.note("to use these places put the file's [marks] into [leg.marks]")
 
 
 def show(
@@ -155,6 +234,9 @@ def show(
             "sigma": dict(zip(names, sigma.tolist(), strict=True)),
             "rms_px": result.rms_px,
             "views": len(used),
+            "view_rms_px": result.view_rms_px.tolist(),
+            "mark_rms_px": mark_residuals(result, list(used.values())),
+            "marks": {n: p.tolist() for n, p in sorted(result.marks.items(), key=by_number)},
             "used": [str(p) for p in used],
             "left_out": {str(p): why for p, why in left_out.items()},
             "file": str(file),

@@ -4,11 +4,15 @@ import click
 
 from legato import __version__
 from legato.cli import act, jobs
+from legato.cli.campaign import campaign, campaigns
 from legato.cli.check import check
+from legato.cli.compare import compare
+from legato.cli.completion import completion
 from legato.cli.demo import demo
 from legato.cli.detect import detect
 from legato.cli.emulate import emulate
 from legato.cli.exits import EPILOG
+from legato.cli.export import export
 from legato.cli.intrinsics import intrinsics
 from legato.cli.keygen import keygen
 from legato.cli.report import report
@@ -18,6 +22,7 @@ from legato.cli.snapshot import snapshot
 from legato.cli.solve import solve
 from legato.cli.status import status
 from legato.cli.watch import watch
+from legato.cli.web import web
 
 
 class InOrder(click.Group):
@@ -39,7 +44,8 @@ def main() -> None:
 
 
 for item in (
-    demo, serve, status, *jobs.COMMANDS, *act.COMMANDS, watch, sessions, report,
-    detect, solve, intrinsics, snapshot, emulate, keygen, check,
+    demo, serve, status, *jobs.COMMANDS, campaign, *act.COMMANDS, watch, web, sessions, campaigns,
+    report, compare, export, detect, solve, intrinsics, snapshot, emulate, keygen, check,
+    completion,
 ):  # fmt: skip
     main.add_command(item)

@@ -14,6 +14,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+NO_STYLES: Mapping[str, str] = {}
+
 
 class Output:
     """One command's stdout and stderr."""
@@ -36,8 +38,16 @@ class Output:
         """Say a result to a person."""
         self._results.print(text, markup=False, soft_wrap=True)
 
-    def table(self, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-        """Show a table to a person; numbers stand to the right. A pipe gets whole lines."""
+    def table(
+        self,
+        columns: Sequence[str],
+        rows: Iterable[Sequence[Any]],
+        styles: Mapping[str, str] = NO_STYLES,
+    ) -> None:
+        """Show a table to a person; numbers stand to the right. A pipe gets whole lines.
+
+        `styles` has rich's style of a cell by its text, for a terminal.
+        """
         cells = [[shown(v) for v in row] for row in rows]
         right = [bool(cells) and all(numeric(r[i]) for r in cells) for i in range(len(columns))]
         if not self._results.is_terminal:
@@ -48,7 +58,7 @@ class Output:
         for name, numbers in zip(columns, right, strict=True):
             table.add_column(name, justify="right" if numbers else "left")
         for row in cells:
-            table.add_row(*(Text(cell) for cell in row))
+            table.add_row(*(Text(cell, styles.get(cell, "")) for cell in row))
         self._results.print(table)
 
     def document(self, document: Any) -> None:

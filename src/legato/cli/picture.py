@@ -65,7 +65,9 @@ def _pairs(path: Path, text: str) -> Iterable[tuple[str, tuple[float, float]]]:
     if kind == ".csv":
         yield from _csv_pairs(text)
         return
-    table: Any = json.loads(text) if kind == ".json" else tomllib.loads(text)
+    table: Any = (
+        json.loads(text, object_pairs_hook=_once) if kind == ".json" else (tomllib.loads(text))
+    )
     table = table.get("marks", table) if isinstance(table, Mapping) else table
     if not isinstance(table, Mapping):
         raise TypeError("expected a table of names")
@@ -73,6 +75,15 @@ def _pairs(path: Path, text: str) -> Iterable[tuple[str, tuple[float, float]]]:
         if not isinstance(place, list) or len(place) != 2:
             raise ValueError(f"{name} is {place!r}, expected [u, v]")
         yield str(name), _place(name, place[0], place[1])
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a JSON table; raises ValueError for a name that it has twice."""
+    table = dict(pairs)
+    if len(table) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise ValueError(f"{next(n for n in names if names.count(n) > 1)} stands twice")
+    return table
 
 
 def _csv_pairs(text: str) -> Iterable[tuple[str, tuple[float, float]]]:

@@ -1,37 +1,38 @@
-"""`legato report`: a session's record as one page."""
+"""`legato report`: a session's record as one page, or set for paper."""
 
 from pathlib import Path
 
 import click
 
+from legato.cli.chosen import chosen, completed, place_for
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit, Failure
-from legato.cli.sessions import opened_store, state_dir_option
+from legato.cli.store import state_dir_option
 
 
 @command("report")
-@click.argument("session", required=False)
+@click.argument("session", required=False, shell_complete=completed)
+@click.option("--pdf", is_flag=True, help="As PDF, set for paper; needs legato[pdf].")
 @click.option(
+    "-o",
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="The page's file; by default report.html in the session's folder.",
+    help="The file; by default report.html or report.pdf in the session's folder.",
 )
 @state_dir_option
-def report(context: Context, session: str | None, out: Path | None, state_dir: Path | None) -> None:
+def report(
+    context: Context, session: str | None, pdf: bool, out: Path | None, state_dir: Path | None
+) -> None:
     """Write the report of SESSION, by default the latest, and print its path."""
     from legato.report.html import write_report
+    from legato.report.pdf import NeedsTypst, write_pdf
 
-    if out is not None and not out.absolute().parent.is_dir():
-        hint = "make it first, or name a file in another folder"
-        raise Failure(f"{out}: there is no folder {out.parent}", Exit.USAGE, hint)
-    store = opened_store(context, state_dir)
-    if session is None:
-        found = store.sessions()
-        if not found:
-            hint = "make one with `legato demo`"
-            raise Failure(f"there is no session in {store.folder}", Exit.FAILED, hint)
-        session = found[0].id
-    record = store.read(session)
-    path = write_report(record, out if out is not None else record.path / "report.html")
-    context.output.document({"session": session, "report": str(path)})
+    target = None if out is None else place_for(out)
+    record = chosen(context, session, state_dir)
+    try:
+        path = (write_pdf if pdf else write_report)(record, target)
+    except NeedsTypst as error:
+        hint = "pip install 'legato[pdf]', or leave --pdf out and print the page"
+        raise Failure(str(error), Exit.FAILED, hint) from error
+    context.output.document({"session": record.id, "report": str(path)})
     context.output.say(str(path))

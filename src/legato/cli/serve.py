@@ -1,6 +1,7 @@
 """`legato serve`: the daemon in the foreground."""
 
 import os
+from pathlib import Path
 
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit
@@ -15,8 +16,17 @@ def serve(context: Context) -> None:
     # Before numpy is loaded: its threads would cost start and memory, and nothing here needs them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from legato.config.load import load
+    from legato.daemon.lock import AlreadyRunning, look
+    from legato.daemon.log import make_log
+
+    loaded, log = load(context.config), make_log()
+    try:
+        look(Path(loaded.config.records.state_dir))
+    except AlreadyRunning as error:
+        log.error("already_running", text=str(error), hint="stop it first")
+        context.end(Exit.FAILED)
     from legato.daemon.serve import serve as run
 
-    code = run(load(context.config))
+    code = run(loaded, log)
     if code:
         context.end(Exit(code))

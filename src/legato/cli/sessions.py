@@ -6,33 +6,52 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from legato.cli.command import Context, command
+from legato.cli.examples import write_examples
+from legato.cli.exits import EPILOG
+from legato.cli.records import replay, verify
+from legato.cli.store import opened_store, state_dir_option
 
 if TYPE_CHECKING:
     from legato.records.record import SessionRecord
-    from legato.records.store import Store
-
-state_dir_option = click.option(
-    "--state-dir",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Where the records are; by default records.state_dir.",
-)
 
 
-def opened_store(context: Context, state_dir: Path | None) -> "Store":
-    """Return the store of records under `state_dir`, or where the configuration says."""
-    from legato.config.load import load
-    from legato.records.store import Store
+class Sessions(click.Group):
+    """A group whose first command is meant where none is named: `legato sessions ID`."""
 
-    if state_dir is not None:
-        return Store(state_dir)
-    return Store(Path(load(context.config, need_intrinsics=False).config.records.state_dir))
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Bring the command's name to the front, or put the one that is meant there."""
+        named = [word for word in args if word in self.commands]
+        if named:
+            args = [named[0], *(args[: args.index(named[0])] + args[args.index(named[0]) + 1 :])]
+        elif "--help" not in args:
+            args = ["show", *args]
+        return super().parse_args(ctx, args)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the examples, then what every command ends with."""
+        write_examples(ctx, formatter)
+        super().format_epilog(ctx, formatter)
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Show the options of the command that is meant where none is named."""
+        show = self.commands["show"]
+        show.format_options(click.Context(show, parent=ctx), formatter)
+        self.format_commands(ctx, formatter)
 
 
-@command("sessions")
+@click.group("sessions", cls=Sessions, epilog=EPILOG, subcommand_metavar="[COMMAND] [ID]...")
+def sessions() -> None:
+    """List the recorded sessions, show one, verify its record, or replay it.
+
+    `legato sessions` lists, `legato sessions ID` shows one.
+    """
+
+
+@command("show")
 @click.argument("session", required=False)
 @state_dir_option
 @click.option("--limit", type=click.IntRange(min=1), default=20, show_default=True)
-def sessions(context: Context, session: str | None, state_dir: Path | None, limit: int) -> None:
+def listed(context: Context, session: str | None, state_dir: Path | None, limit: int) -> None:
     """List the latest sessions, newest first, or show one by its SESSION id."""
     store, out = opened_store(context, state_dir), context.output
     if session is not None:
@@ -74,3 +93,7 @@ def states_of(record: "SessionRecord") -> list[str]:
 
 def _kind(simulated: bool) -> str:
     return "simulated" if simulated else "real"
+
+
+for item in (listed, verify, replay):
+    sessions.add_command(item)

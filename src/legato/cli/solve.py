@@ -35,7 +35,7 @@ def solve(
     from legato.config.load import load
     from legato.control.checks import picture_checks
     from legato.control.document import document
-    from legato.control.perceive import pick_marks, solve_marks
+    from legato.control.perceive import pick_marks, refuse_outdated, solve_marks
     from legato.vision.marks import MarksNotFound
 
     loaded = load(context.config)
@@ -45,6 +45,7 @@ def solve(
     began = time.perf_counter()
     seed, picking = settings.calibration.seed, None
     try:
+        refuse_outdated(settings, time.time())
         picking = pick_marks(picture, settings, seed=seed, picks=picked)
         found = solve_marks(picking, settings, seed=seed)
     except (MarksNotFound, CalibrationError) as error:
@@ -92,6 +93,7 @@ def refuse(
     from legato.control.advice import Advice, advise_marks
     from legato.control.document import suggestion
 
+    missing = dict(picking.missing) if picking is not None else {}
     unseen = Advice((), settings.leg.names())
     advice = advise_marks(picking, settings) if picking is not None else unseen
     context.output.document(
@@ -100,10 +102,13 @@ def refuse(
             "reasons": [error.text],
             "hint": error.hint,
             "engine": settings.calibration.engine,
+            "missing": missing,
             "suggest": suggestion(advice),
             "seconds": seconds,
         }
     )
+    for name, reason in missing.items():
+        context.output.note(f"{name} is missing: {reason}")
     hint = error.hint or (f"show {' or '.join(advice.add)} too" if advice.add else "")
     context.output.note(f"not accepted: {error.text}" + (f"\n  what to do: {hint}" if hint else ""))
     context.end(Exit.REFUSED)
@@ -122,9 +127,12 @@ def show(context: Context, result: dict[str, Any]) -> None:
         for s in result["stations"]
     ]
     out.table(("station mm", "x mm", "y mm", "z mm", "sigma mm"), places)
+    left, marks = result["left_out"], f"{len(result['marks'])} marks"
+    if left:
+        marks = f"{len(result['marks']) - len(left)} marks, without {' and '.join(left)}"
+    verdict = "accepted" if result["accepted"] else "not accepted"
     out.say(
-        f"{'accepted' if result['accepted'] else 'not accepted'}: {result['engine']}, "
-        f"{len(result['marks'])} marks, {result['rms_px']:.3f} px rms, pose to "
+        f"{verdict}: {result['engine']}, {marks}, {result['rms_px']:.3f} px rms, pose to "
         f"{sigma['rotation_deg']:.3f} deg and {sigma['translation_mm']:.3f} mm, "
         f"{result['seconds']:.2f} s"
     )

@@ -32,10 +32,22 @@ def rows(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
     if answer.get("station") is not None:
         found.insert(2, ("station", f"{answer['station']:g} mm"))
+    if campaign := answer.get("campaign"):
+        found.append(("campaign", _campaign(campaign)))
     if fault := answer.get("fault"):
         found.append(("fault", f"{fault.get('cause')}: {fault.get('text')}"))
         found.append(("what to do", str(fault.get("hint"))))
     return found
+
+
+def _campaign(campaign: Mapping[str, Any]) -> str:
+    of = f" of {campaign['total']}" if campaign.get("total") else ""
+    done = f"{campaign.get('done')}{of} done, {campaign.get('failed')} failed"
+    if not campaign.get("underway"):
+        return f"{campaign.get('id')} {campaign.get('outcome')}: {done}"
+    left = campaign.get("next_in_s")
+    soon = f", next in {left:.0f} s" if left is not None else ""
+    return f"{campaign.get('id')} by {campaign.get('by')}: {done}{soon}"
 
 
 def _arm(arm: Mapping[str, Any]) -> str:

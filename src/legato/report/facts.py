@@ -80,20 +80,19 @@ def warnings(record: SessionRecord) -> list[str]:
     return found + [f"A part of the record cannot be read: {d}." for d in record.damage]
 
 
-def fault(record: SessionRecord) -> Row | None:
-    """Return the fault that ended the session with its evidence, None where there was none."""
-    faults = record.of_kind("fault")
-    if not faults:
-        return None
-    told = faults[-1]["data"]
-    evidence = told.get("evidence")
-    return {
-        "cause": told.get("cause"),
-        "text": told.get("text"),
-        "hint": told.get("hint"),
-        "evidence": evidence if isinstance(evidence, dict) else {},
-        "wall": faults[-1].get("wall"),
-    }
+def faults(record: SessionRecord) -> list[Row]:
+    """Return every fault of the session with its evidence, the one that ended it first."""
+    found = []
+    for event in reversed(record.of_kind("fault")):
+        evidence = event["data"].get("evidence")
+        found.append(
+            {
+                **{key: event["data"].get(key) for key in ("cause", "text", "hint")},
+                "evidence": evidence if isinstance(evidence, dict) else {},
+                "wall": event.get("wall"),
+            }
+        )
+    return found
 
 
 def search(solved: Mapping[str, Any]) -> list[str]:

@@ -1,7 +1,7 @@
 """The report of a session: one HTML file that needs nothing else, from whatever is recorded."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from legato.report.figures import canvas, closeups, curves, picture, space
 from legato.report.paper import PLACEMENT_ERROR_MM, POSES
 from legato.report.scene import Scene, scene_of
 from legato.report.score import score
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 TEMPLATE = "session.html.j2"
 LAST_EVENTS = 12
@@ -34,19 +37,23 @@ def write_report(record: SessionRecord, path: Path | None = None) -> Path:
 
 def render(record: SessionRecord) -> str:
     """Return the report as one HTML text."""
+    return environment().get_template(TEMPLATE).render(**content(record))
+
+
+def environment(**options: Any) -> "Environment":
+    """Return where templates are found, with the filters that they share."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    environment = Environment(
+    made = Environment(
         loader=PackageLoader("legato.report"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        **options,
     )
-    environment.filters["num"] = number
-    environment.filters["told"] = facts.told
-    environment.filters["figure_text"] = significant
-    return environment.get_template(TEMPLATE).render(**content(record))
+    made.filters |= {"num": number, "told": facts.told, "figure_text": significant}
+    return made
 
 
 def content(record: SessionRecord) -> dict[str, Any]:
@@ -57,7 +64,7 @@ def content(record: SessionRecord) -> dict[str, Any]:
         "meta": record.meta,
         "head": facts.headline(record),
         "warnings": facts.warnings(record),
-        "fault": facts.fault(record),
+        "faults": facts.faults(record),
         "solved": solved,
         "search": facts.search(solved),
         "remarks": [w for w in solved.get("warnings") or () if SAID not in w],

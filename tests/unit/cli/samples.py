@@ -19,6 +19,7 @@ from legato.geometry.projection import Intrinsics
 TOML = """
 [camera]
 intrinsics = "lens.toml"
+max_intrinsics_age_days = 36500.0
 
 [cell]
 camera_at_mm = {at}

@@ -11,6 +11,7 @@ from legato.cli.doctor import device, examine
 from legato.cli.exits import Exit
 from legato.config.intrinsics import read_intrinsics
 from legato.config.load import load
+from legato.geometry.leg import Leg
 from legato.records.store import Store
 from legato.vision.picture import encode_png
 from tests.unit.cli.samples import document, run, write_cell
@@ -72,6 +73,45 @@ def test_a_picture_that_is_not_there_is_a_slip(cell: Path, views: Path, tmp_path
     assert "view-001.png" not in result.stderr
 
 
+def test_slips_are_told_before_anything_is_computed(cell: Path, picture: Path) -> None:
+    """No folder for --out, a picture as --out, and a sigma that is no number end with 2."""
+    for out, sigma, why in (
+        (cell.parent / "none" / "x.toml", "0", "no folder"),
+        (picture, "0", "one of the pictures"),
+        (cell.parent / "x.toml", "nan", "a length in mm"),
+    ):
+        options = ("--out", out, "--mark-sigma", sigma)
+        result = run("intrinsics", "--config", cell, picture, *options)
+        assert result.exit_code == Exit.USAGE
+        assert why in result.stderr
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_leg_seen_alike_again_is_no_new_view(cell: Path, picture: Path, tmp_path: Path) -> None:
+    """Ten copies of one picture are one view, and too few."""
+    files = [tmp_path / f"copy-{n}.png" for n in range(10)]
+    for file in files:
+        file.write_bytes(picture.read_bytes())
+    result = run("intrinsics", "--config", cell, *files, "--out", tmp_path / "x.toml")
+    assert result.exit_code == Exit.REFUSED
+    assert "copy-9.png: shows the leg just as" in result.stderr
+    assert "1 view is too few" in result.stderr
+
+
+def test_swapped_picks_are_left_out_and_named(cell: Path, picture: Path, tmp_path: Path) -> None:
+    """Two names in each other's places: document, warning and text say what is left out."""
+    marks = document(run("detect", picture, "--config", cell, "--json"))["marks"]
+    marks["P6"], marks["P7"] = marks["P7"], marks["P6"]
+    picks = tmp_path / "picks.json"
+    picks.write_text(json.dumps(marks))
+    result = run("solve", picture, "--config", cell, "--picks", picks, "--json")
+    found = document(result)
+    assert found["left_out"] == ["P6", "P7"]
+    assert "P6, P7" in found["warnings"][0]
+    assert "without P6 and P7" in result.stderr
+    assert set(found["marks"]) >= {"P6", "P7"}
+
+
 def test_intrinsics_are_found_from_snapshots(cell: Path, views: Path, tmp_path: Path) -> None:
     """From the pictures the true camera is found within its sigmas; the blank one is named."""
     out = tmp_path / "found.toml"
@@ -86,6 +126,52 @@ def test_intrinsics_are_found_from_snapshots(cell: Path, views: Path, tmp_path: 
         error = abs(getattr(found, name) - getattr(truth, name))
         assert error < 4.0 * told["sigma"][name], name
     assert abs(found.alpha_u / truth.alpha_u - 1.0) < 0.003
+
+
+def test_marks_pasted_by_hand_are_estimated_too(cell: Path, views: Path, tmp_path: Path) -> None:
+    """On request the marks' places move: where [leg] has one 0.4 mm off, the file says so."""
+    text = cell.read_text() + "[leg.marks]\n"
+    for name, (x, y, z) in Leg().marks.items():
+        off = 0.4 if name == "P6" else 0.0
+        text += f"{name} = [{x + off}, {y + off * Leg().slope}, {z}]\n"
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text(text)
+    out, files = tmp_path / "found.toml", sorted(views.glob("view-*.png"))
+    options = ("--mark-sigma", "0.2", "--out", out)
+    result = run("intrinsics", "--config", wrong, *files, *options, "--json")
+    assert result.exit_code == 0, result.output
+    found, truth = read_intrinsics(out), Leg().marks
+    assert abs(found.alpha_u / load(cell).config.sim.alpha_u - 1.0) < 0.003
+    assert len(found.view_rms_px) == found.views
+    assert set(found.mark_rms_px) == set(found.marks) == set(truth)
+    assert "P6" in result.stderr
+    moved = {n: np.linalg.norm(np.subtract(found.marks[n], truth[n])) for n in truth}
+    assert moved["P6"] < 0.1
+    assert max(moved.values()) < 0.15
+
+
+def test_intrinsics_too_old_or_of_the_future_are_refused(
+    cell: Path, picture: Path, tmp_path: Path
+) -> None:
+    """An intrinsics file past its days is refused by solve and told by check; so is tomorrow's."""
+    for created, days, why in (
+        ("2020-01-01", "730.0", "days old, 730 are allowed"),
+        ("2999-01-01", "36500.0", "days from now"),
+    ):
+        old = tmp_path / "cell.toml"
+        old.write_text(cell.read_text().replace("36500.0", days))
+        lens = (cell.parent / "lens.toml").read_text()
+        (tmp_path / "lens.toml").write_text(lens.replace("2026-11-20T10:00:00+00:00", created))
+        result = run("solve", picture, "--config", old, "--json")
+        assert result.exit_code == Exit.REFUSED
+        found = document(result)
+        assert found["accepted"] is False
+        assert why in found["reasons"][0]
+        assert found["hint"]
+        assert run("check", "--config", old).exit_code == (Exit.USAGE if days == "730.0" else 0)
+        free = tmp_path / "free.toml"
+        free.write_text(old.read_text() + "[calibration]\nintrinsics = 'free'\n")
+        assert "days old" not in run("solve", picture, "--config", free).output
 
 
 def test_too_few_pictures_are_refused_by_name(cell: Path, views: Path, tmp_path: Path) -> None:
@@ -199,6 +285,18 @@ def test_check_reports_a_missing_lens_beside_the_rest(tmp_path: Path) -> None:
     assert result.exit_code == Exit.USAGE
     assert "legato intrinsics" in result.stdout
     assert "station 7 mm" in result.stdout
+
+
+def test_check_tells_of_faults_on_schedule(tmp_path: Path) -> None:
+    """A simulated cell may have them; before a real arm they are found wanting."""
+    faults = "faults = [{ kind = 'arm_lost', call = 3 }]\n"
+    result = run("check", "--config", write_cell(tmp_path, faults))
+    assert result.exit_code == 0, result.output
+    assert "1 on schedule: arm_lost" in result.output
+    text = write_cell(tmp_path, faults + "[robot]\ndriver = 'teachmover'\n")
+    result = run("check", "--config", text)
+    assert result.exit_code == 1
+    assert "take sim.faults out" in result.output
 
 
 def test_check_finds_a_station_out_of_reach(tmp_path: Path) -> None:

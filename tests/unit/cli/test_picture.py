@@ -41,6 +41,7 @@ def test_picks_are_read_from_each_format(tmp_path: Path, name: str, text: str) -
         ("a.json", '{"P1": [true, 1]}', "expected a number"),
         ("a.json", '{"P7": [1, 2]}', "no mark 'P7'"),
         ("a.json", "{}", "no picks"),
+        ("a.json", '{"P1": [1, 2], "P1": [3, 4]}', "P1 stands twice"),
         ("a.json", "{", "no picks"),
         ("a.json", "[" * 100_000, "no picks"),
         ("a.toml", "P1 = ", "no picks"),

@@ -22,7 +22,7 @@ FIGURES = (
     "Marks, residuals, leg outline",
     "Each mark enlarged",
     "Best and mean cost",
-    "from above and from the side",
+    "from above, from the side and from the end",
     "way over the picture",
     "Touched height",
     "Height over the predicted surface in each stroke",
@@ -182,7 +182,7 @@ def test_a_session_broken_off_in_a_pass(tmp_path: Path) -> None:
     assert "broke it off after event 3" in page.text
     assert page.text.index("This record is torn") < page.text.index("What was asked")
     assert "hash chain whole" not in page.text
-    assert "from above and from the side" in " ".join(page.pictures)
+    assert "from above, from the side and from the end" in " ".join(page.pictures)
 
 
 def test_a_changed_record_is_called_out(tmp_path: Path) -> None:
@@ -285,8 +285,22 @@ def test_numbers_are_written_for_people(value: float | None, shown: str) -> None
 
 def test_every_station_is_in_the_views(whole_page: str) -> None:
     """The figures are drawn with text as outlines: their labels are there as comments."""
-    svg = svg_of(Page(whole_page), "from above and from the side")
+    svg = svg_of(Page(whole_page), "from above, from the side and from the end")
     for station in STATIONS:
         assert f"<!-- {station:g} mm -->" in svg
     assert "<!-- x (mm) -->" in svg
     assert "<!-- z (mm) -->" in svg
+    for title in ("From above", "From the side", "From the end"):
+        assert f"<!-- {title} -->" in svg
+
+
+def test_every_fault_stands_with_its_evidence_the_last_one_first(tmp_path: Path) -> None:
+    """A session that met two faults shows both, the one that ended it on top."""
+    cell = begun(tmp_path)
+    for cause in ("camera_stale", "arm_lost"):
+        cell.event("fault", cause=cause, text=f"{cause} happened", hint="look",
+                   evidence={"asked": cause})  # fmt: skip
+    page = Page(render(read_session(cell.writer.path))).text
+    assert page.index("Fault arm_lost") < page.index("Fault camera_stale")
+    assert page.index("Fault camera_stale") < page.index("What was asked")
+    assert page.count("Evidence") == 2

@@ -153,7 +153,7 @@ def timeline(stays: Sequence[Stay]) -> str:
     for stay in stays:
         row = names.index(stay.state)
         width = max(stay.seconds, end * 0.002)  # a stay of no length is still seen
-        axes.barh(row, width, left=stay.began, height=0.62, color=_state_colour(stay.state))
+        axes.barh(row, width, left=stay.began, height=0.62, color=state_colour(stay.state))
     for row, name in enumerate(names):
         own = [s for s in stays if s.state == name]
         total = sum(s.seconds for s in own)
@@ -170,6 +170,6 @@ def timeline(stays: Sequence[Stay]) -> str:
     return svg(figure)
 
 
-def _state_colour(state: str) -> str:
+def state_colour(state: str) -> str:
     """Return a state's colour; the massage states share one."""
     return STATE_COLOURS.get(state, ORANGE)

@@ -1,4 +1,4 @@
-"""The fingertip's way in the robot base frame, from above and from the side (paper figure 5.4a)."""
+"""The fingertip's way in the robot base frame: from above, the side and the end (figure 5.4a)."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from legato.report.figures.canvas import (
     SMALL,
     SOFT,
     WHY_COLOURS,
+    WIDTH,
     dressed,
     limits,
     sheet,
@@ -25,6 +26,7 @@ from legato.report.scene import Scene, silhouette, surface_samples
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 NAMES = "xyz"
 
@@ -36,31 +38,51 @@ def views(
     true_pose: Array | None = None,
     table_z: float = 0.0,
 ) -> str:
-    """Return both views, along and across the horizontal axis that the leg follows."""
+    """Return three views: from above, from the side, and along the leg from its big face."""
     along = 1 if scene is None or abs(scene.world_from_object[1, 0]) > 0.7 else 0
     across = 1 - along
     places = np.stack([path["x"], path["y"], path["z"]], axis=-1)
     spans = [_span(places, scene, axis) for axis in range(3)]
-    width = spans[along][1] - spans[along][0]
-    tall = [spans[across][1] - spans[across][0], spans[2][1] - min(spans[2][0], table_z - 8.0)]
-    figure = sheet(1.85 + 7.7 * sum(tall) / width, top=0.35, bottom=0.95)
-    above, side = figure.subplots(2, 1, sharex=True, height_ratios=tall)
-    figure.subplots_adjust(hspace=0.8 * width / (7.7 * sum(tall)))
-    for axes, up in ((above, across), (side, 2)):
-        _draw(axes, (along, up), path["why"], places, scene, contacts, true_pose)
-        axes.set_aspect("equal", adjustable="box")
-        axes.set_xlim(spans[along])
-    above.set_ylim(spans[across])
+    spans[2] = (min(spans[2][0], table_z - 8.0), spans[2][1])
+    figure, (above, side, end) = _panels([spans[a][1] - spans[a][0] for a in (along, across, 2)])
+    for axes, plane in ((above, (along, across)), (side, (along, 2)), (end, (across, 2))):
+        _draw(axes, plane, path["why"], places, scene, contacts, true_pose)
+        axes.set_xlim(spans[plane[0]])
+        axes.set_ylim(spans[plane[1]])
     if along == 1:  # y to the right is a view from above only where x runs down
         above.invert_yaxis()
-    side.set_ylim(min(spans[2][0], table_z - 8.0), spans[2][1])
-    side.axhline(table_z, color=SOFT, linewidth=1.0)
+    else:  # who looks along x has y to the left
+        end.invert_xaxis()
+    for axes in (side, end):
+        axes.axhline(table_z, color=SOFT, linewidth=1.0)
     side.annotate("table", (spans[along][0] + 3.0, table_z - 6.0), fontsize=SMALL, color=SOFT)
     dressed(above, y=f"{NAMES[across]} (mm)", title="From above")
     dressed(side, x=f"{NAMES[along]} (mm)", y="z (mm)", title="From the side")
+    dressed(end, x=f"{NAMES[across]} (mm)", title="From the end")
     handles, labels = above.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="lower center", ncols=5, fontsize=SMALL, frameon=False)
+    corner = end.get_position()
+    figure.legend(
+        handles, labels, loc="center left", fontsize=SMALL, frameon=False,
+        bbox_to_anchor=(corner.x0, (above.get_position().y0 + above.get_position().y1) / 2.0),
+    )  # fmt: skip
     return svg(figure)
+
+
+def _panels(spans: Sequence[float]) -> tuple["Figure", tuple["Axes", "Axes", "Axes"]]:
+    """Return a sheet with three views of one scale, for spans along, across and up in mm."""
+    along, across, up = spans
+    left, gap, right, top, between, bottom = 0.75, 0.45, 0.15, 0.35, 0.55, 0.5
+    scale = (WIDTH - left - gap - right) / (along + across)
+    height = top + between + bottom + scale * (across + up)
+    figure = sheet(height)
+
+    def panel(x: float, y: float, wide: float, tall: float) -> "Axes":
+        place = (x / WIDTH, y / height, scale * wide / WIDTH, scale * tall / height)
+        return figure.add_axes(place)
+
+    above = panel(left, bottom + scale * up + between, along, across)
+    side = panel(left, bottom, along, up)
+    return figure, (above, side, panel(left + scale * along + gap, bottom, across, up))
 
 
 def _span(places: Array, scene: Scene | None, axis: int) -> tuple[float, float]:
@@ -105,6 +127,8 @@ def _stations(axes: "Axes", plane: tuple[int, int], scene: Scene) -> None:
     tops = scene.leg.surface_point(np.array(scene.stations))
     points = apply(scene.world_from_object, tops)[:, plane]
     axes.plot(*points.T, "D", color=GREEN, markersize=4, label="station", linestyle="none")
+    if np.ptp(points[:, 0]) < 30.0:  # from the end the names would lie on each other
+        return
     for station, point in zip(scene.stations, points, strict=True):
         axes.annotate(
             f"{station:g} mm",

@@ -1,0 +1,95 @@
+"""`legato compare`: sessions side by side, as a page and as tables."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from legato.cli.chosen import completed, place_for
+from legato.cli.command import Context, command
+from legato.cli.exits import Exit, Failure
+from legato.cli.store import opened_store, state_dir_option
+
+if TYPE_CHECKING:
+    from legato.records.store import Store
+    from legato.report.compare import Comparison
+
+
+@command("compare")
+@click.argument("sessions", nargs=-1, shell_complete=completed)
+@click.option("--last", type=click.IntRange(min=2), help="The latest so many, instead of names.")
+@click.option("--job", help="With --last: only sessions of this job.")
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default=Path("compare.html"),
+    show_default=True,
+    help="The page's file.",
+)
+@state_dir_option
+def compare(
+    context: Context,
+    sessions: tuple[str, ...],
+    last: int | None,
+    job: str | None,
+    out: Path,
+    state_dir: Path | None,
+) -> None:
+    """Put SESSIONS side by side: how they ended, how well they repeat, what was different.
+
+    Writes a page with plots, and shows its tables here.
+    """
+    from legato.report.campaign import write_comparison
+
+    store, target = opened_store(context, state_dir), place_for(out)
+    names = chosen_names(store, sessions, last, job)
+    found = write_comparison([store.read(name) for name in names], target)
+    context.output.document({**found.as_json(), "report": str(target)})
+    show(context, found)
+    context.output.say(str(target))
+
+
+def chosen_names(
+    store: "Store", sessions: tuple[str, ...], last: int | None, job: str | None
+) -> list[str]:
+    """Return the sessions to compare, oldest first where they are not named."""
+    if sessions and last is not None:
+        raise click.UsageError("name sessions, or give --last, not both")
+    if job is not None and last is None:
+        raise click.UsageError("--job goes with --last")
+    names = list(sessions)
+    if last is not None:
+        names = [s.id for s in store.sessions() if job in (None, s.job)][:last][::-1]
+    if len(names) < 2:
+        hint = "name two or more, or give --last N; `legato sessions` lists them"
+        raise Failure("there is nothing to compare", Exit.USAGE, hint)
+    return names
+
+
+def show(context: Context, found: "Comparison") -> None:
+    """Show sessions, stations and differences to a person."""
+    out = context.output
+    if found.mixed:
+        out.say("simulated and real sessions stand side by side: their figures differ in meaning")
+    out.table(
+        ("no.", "session", "job", "outcome", "cell", "s", "rms px", "1 sigma mm", "true mm"),
+        [
+            (s.number, s.id, s.job, s.outcome, "simulated" if s.simulated else "real",
+             s.seconds, s.rms_px, s.sigma_mm, s.error_mm)
+            for s in found.sides
+        ],
+    )  # fmt: skip
+    if found.stations:
+        out.say("")
+        out.table(
+            ("station mm", "mean mm", "between sessions sd mm", "within sd mm", "range mm"),
+            [(f"{t.station_mm:g}", t.mean, t.between, t.within, t.span) for t in found.stations],
+        )
+    if found.pose_sd_mm is not None:
+        out.say("")
+        out.say("leg found, sd: " + ", ".join(f"{v:.3f}" for v in found.pose_sd_mm) + " mm")
+    if found.differences:
+        out.say("")
+        keys = [(d.key, *d.values) for d in found.differences[:20]]
+        out.table(("different", *(str(s.number) for s in found.sides)), keys)

@@ -1,0 +1,67 @@
+"""Sessions side by side as one HTML file that needs nothing else."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from legato.records.errors import told as told_error
+from legato.records.files import make_folder, replace_file
+from legato.records.record import SessionRecord
+from legato.report import facts
+from legato.report.compare import Comparison, Side, compare
+from legato.report.figures import campaign
+from legato.report.html import environment, number
+
+TEMPLATE = "compare.html.j2"
+SIDE_BY_SIDE = 5  # with more sessions than these each has a row instead of a column
+
+
+def write_comparison(records: Sequence[SessionRecord], path: Path) -> Comparison:
+    """Write the page of several sessions and return what it says.
+
+    Raises ValueError for fewer than two, RecordError where the file cannot be written.
+    """
+    found = compare(records)
+    page = environment().get_template(TEMPLATE).render(**content(found, records))
+    make_folder(path.parent)
+    with told_error("write", path):
+        replace_file(path, page.encode())
+    return found
+
+
+def content(found: Comparison, records: Sequence[SessionRecord]) -> dict[str, Any]:
+    """Return everything that the template shows, by name."""
+    return {
+        "found": found,
+        "tones": [facts.headline(record)["tone"] for record in records],
+        "flaws": [(s.number, text) for s, r in zip(found.sides, records, strict=True)
+                  for text in facts.warnings(r)],
+        "names": [name for name, _ in figures(found.sides[0])],
+        "rows": [[value for _, value in figures(side)] for side in found.sides],
+        "columns": len(found.sides) <= SIDE_BY_SIDE,
+        "contacts": campaign.contacts(found),
+        "poses": campaign.poses(found),
+        "quality": campaign.quality(found),
+        "durations": campaign.durations(found),
+    }  # fmt: skip
+
+
+def figures(side: Side) -> list[tuple[str, str]]:
+    """Return a session's figures as names and text."""
+    shift = side.pose.shift_mm if side.pose else (None,) * 3
+    turn = side.pose.turn_deg if side.pose else (None,) * 3
+    return [
+        ("session", side.id),
+        ("job", side.job),
+        ("outcome", side.outcome or "none yet"),
+        ("cell", "simulated" if side.simulated else "real"),
+        ("seconds", number(side.seconds, 1)),
+        ("engine", side.engine or number(None)),
+        ("residual rms px", number(side.rms_px, 3)),
+        ("worst station 1 \N{GREEK SMALL LETTER SIGMA} mm", number(side.sigma_mm, 3)),
+        ("strokes with contact", str(side.strokes)),
+        ("mean contact mm", number(side.contact_mm, 3, sign=True)),
+        ("worst error, true mm", number(side.error_mm, 3)),
+        ("leg from the mean, x y z mm", " ".join(number(v, 3, sign=True) for v in shift)),
+        ("turn from the mean, x y z deg", " ".join(number(v, 3, sign=True) for v in turn)),
+    ]

@@ -1,0 +1,210 @@
+"""The live view: what it knows, what it draws, and that it outlives the daemon."""
+
+import io
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, cast
+
+import pytest
+from rich.console import Console
+
+from legato.cli import watch
+from legato.cli.live import STALE_S, Live
+from legato.cli.screen import fault_rows, screen
+from legato.daemon.client import Client, DaemonUnavailable
+
+STATES = ("idle", "capture", "calibrate", "verify", "move_home", "massage_7", "massage_67",
+          "paused", "stopping", "fault")  # fmt: skip
+ARM = {"connected": True, "referenced": True, "xyz_mm": [127.0, -2.5, 60.0], "pitch_deg": -90.0,
+       "roll_deg": 0.0, "contact": False}  # fmt: skip
+
+
+def status(state: str = "idle", boot: str = "b1", **more: Any) -> dict[str, Any]:
+    """Return what a daemon answers to `status`."""
+    return {
+        "boot": boot, "version": "0.1.0", "simulated": True, "state": state, "session": None,
+        "progress": None, "arm": dict(ARM), "camera": {"connected": True, "age_s": 3.0},
+        "calibration": {"valid": True, "age_s": 9.0, "rms_px": 0.007, "sigma_mm": 0.11},
+        "fault": None, **more,
+    }  # fmt: skip
+
+
+def seen() -> Live:
+    """Return a view that a daemon has answered at 10 s."""
+    live = Live("tcp://127.0.0.1:5760", STATES)
+    live.answered(status(), 10.0)
+    return live
+
+
+def drawn(live: Live, now: float, width: int = 120, height: int = 40) -> str:
+    """Return the screen as text."""
+    console = Console(width=width, height=height, file=io.StringIO())
+    with console.capture() as held:
+        console.print(screen(live, now, width, height), height=height)
+    return held.get()
+
+
+def follow(live: Live) -> None:
+    """Let a session begin, touch twice at 7 mm, and go on to 67 mm."""
+    live.take("session", {"boot": "b1", "id": "s1", "job": "run", "outcome": None}, 11.0)
+    live.take("state", {"boot": "b1", "state": "massage_7", "session": "s1"}, 12.0)
+    for height in (-0.2, -0.34):
+        contact = {"boot": "b1", "station_mm": 7.0, "contact_mm": height, "session": "s1"}
+        live.take("contact", contact, 13.0)
+    told = {"boot": "b1", "arm": ARM | {"contact": True}, "why": "press", "station_mm": 67.0}
+    live.take("telemetry", told, 13.5)
+    said = {"boot": "b1", "text": "press 1 at 67 mm", "done": 4, "total": 12}
+    live.take("progress", said, 13.6)
+    live.take("state", {"boot": "b1", "state": "massage_67", "session": "s1"}, 14.0)
+
+
+def test_states_add_up_and_the_present_one_is_lit() -> None:
+    """How long each state lasted is told, the present one stands out in words too."""
+    live = seen()
+    follow(live)
+    assert live.stays == {"idle": 2.0, "massage_7": 2.0}
+    page = drawn(live, 15.0)
+    assert "> massage_67" in page
+    assert "* massage_7 " in page
+    assert "SIMULATED" in page
+    assert "press at 67 mm" in page
+    assert "4/12" in page
+    assert "YES" in page
+
+
+def test_contacts_stand_by_station_with_the_last_one() -> None:
+    """The last contact is a figure and a mark on the scale; those before it are marks."""
+    live = seen()
+    follow(live)
+    page = drawn(live, 15.0)
+    (line,) = [row for row in page.splitlines() if " 7 mm " in row and "@" in row]
+    assert "-0.340" in line
+    assert line.count("o") == 1
+    assert line.index("@") < line.index("|", line.index("@"))
+
+
+def test_contacts_of_another_session_are_not_this_ones() -> None:
+    """A new session begins with none, and the last one of an old session is left out."""
+    live = seen()
+    follow(live)
+    live.take("session", {"boot": "b1", "id": "s2", "job": "run", "outcome": None}, 20.0)
+    old = {"boot": "b1", "station_mm": 7.0, "contact_mm": 1.0, "session": "s1"}
+    live.take("contact", old, 20.1)
+    assert (live.session, live.contacts, live.stays) == ("s2", {}, {})
+    assert "none in this session" in drawn(live, 21.0)
+
+
+def test_silence_is_stale_and_no_answer_is_lost() -> None:
+    """Both are said in words, with what was last known; what comes back is called so."""
+    live = seen()
+    assert live.link(10.0 + STALE_S) == "live"
+    assert live.link(10.1 + STALE_S) == "stale"
+    assert "STALE: nothing heard for 5 s" in drawn(live, 15.0)
+    live.lose(16.0)
+    live.lose(17.0)
+    page = drawn(live, 20.0)
+    assert "CONNECTION LOST 4 s" in page
+    assert "last known: idle" in page
+    live.answered(status(), 21.0)
+    assert live.link(21.0) == "live"
+    assert [text for _, topic, text in live.said if topic == "link"] == [
+        "the daemon does not answer; trying again", "the daemon answers again",
+    ]  # fmt: skip
+
+
+def test_a_daemon_that_began_anew_leaves_nothing_of_the_old_one() -> None:
+    """Contacts, stays and session are gone; events of the old boot are not taken."""
+    live = seen()
+    follow(live)
+    live.answered(status("fault", "b2", fault={"cause": "interrupted", "text": "t"}), 30.0)
+    assert (live.contacts, live.stays, live.session, live.state) == ({}, {}, None, "fault")
+    live.take("state", {"boot": "b1", "state": "massage_7"}, 31.0)
+    assert live.state == "fault"
+
+
+def test_a_fault_is_shown_with_what_to_do_until_it_is_left() -> None:
+    """Cause, text and hint stand under the banner, at any width; reset takes them away."""
+    live = seen()
+    told = {
+        "boot": "b1",
+        "cause": "arm_lost",
+        "text": "no answer from the arm " * 4,
+        "hint": "plug",
+    }
+    live.take("fault", told, 12.0)
+    live.take("state", {"boot": "b1", "state": "fault"}, 12.0)
+    for width in (60, 80, 120):
+        page = drawn(live, 13.0, width)
+        assert "FAULT arm_lost" in page
+        assert "what to do: plug" in page
+        assert "legato reset" in page
+    assert fault_rows(told, 60) > fault_rows(told, 200)
+    live.take("state", {"boot": "b1", "state": "idle"}, 14.0)
+    assert "FAULT" not in drawn(live, 15.0)
+
+
+@pytest.mark.parametrize(("width", "height"), [(20, 5), (60, 12), (80, 24), (250, 80)])
+def test_it_draws_at_any_size_and_before_anything_is_known(width: int, height: int) -> None:
+    """No line is wider than the terminal, nothing is more than it is high."""
+    bare = Live("tcp://127.0.0.1:5760")
+    known = seen()
+    follow(known)
+    for live in (bare, known):
+        lines = drawn(live, 15.0, width, height).splitlines()
+        assert len(lines) <= height
+        assert max(map(len, lines)) <= width
+
+
+class Flaky:
+    """A client whose daemon answers, dies, and comes back as another; then Ctrl-C."""
+
+    def __init__(self) -> None:
+        self.answers: list[Any] = [status(), DaemonUnavailable("gone"), status(boot="b2")]
+
+    def call(self, method: str) -> Any:
+        """Answer as told, in order."""
+        if method == "describe":
+            return {"states": STATES}
+        if not self.answers:
+            raise KeyboardInterrupt
+        answer = self.answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    def events(self, timeout_s: float) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Give nothing."""
+        del timeout_s
+        return iter(())
+
+
+def test_the_screen_outlives_the_daemon() -> None:
+    """A daemon that dies and another one that comes are both drawn; Ctrl-C ends it."""
+    shown: list[str] = []
+
+    def listen(client: Client, live: Live, draw: Callable[[], None]) -> None:
+        del client
+        draw()
+        shown.append(live.link(time.monotonic()) + " " + str(live.boot))
+
+    console = Console(width=100, height=30, force_terminal=True, file=io.StringIO())
+    with pytest.raises(KeyboardInterrupt):
+        watch.full_screen(cast(Client, Flaky()), "tcp://127.0.0.1:5760", console, listen)
+    assert shown == ["live b1", "lost b1", "live b2"]
+
+
+def test_events_are_taken_and_drawn_as_they_come() -> None:
+    """Every event reaches the view; a fault ends the listening, so that its hint is asked for."""
+    live, drawings = seen(), []
+    live.take("heartbeat", {"boot": "b1", "state": "idle", "uptime_s": 1.0}, time.monotonic())
+
+    class Telling(Flaky):
+        def events(self, timeout_s: float) -> Iterator[tuple[str, dict[str, Any]]]:
+            del timeout_s
+            yield "state", {"boot": "b1", "state": "massage_7"}
+            yield "state", {"boot": "b1", "state": "fault"}
+            yield "state", {"boot": "b1", "state": "idle"}
+
+    watch.hear(cast(Client, Telling()), live, lambda: drawings.append(live.state))
+    assert live.state == "fault"
+    assert drawings[-1] == "fault"
