@@ -4,7 +4,9 @@ import importlib
 import sys
 
 NAMES = (
-    "calibration", "paper", "pictures", "adversary", "demo", "line", "daemon", "passes", "stops",
+    "calibration", "paper", "pictures", "adversary", "demo", "line", "daemon", "events", "passes",
+    "ptypasses", "truetime", "stops", "faults", "unattended", "replays", "web",
+    "report", "machine", "abuse", "soak",
 )  # fmt: skip
 
 

@@ -5,32 +5,29 @@ its own. Ratios within one run count, not the microseconds.
 """
 
 import json
-import socket
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import zmq
 
+from bench.process import free_ports, megabytes, secrets, serving, until
 from bench.row import Row, keep
-from legato.config.load import load
-from legato.config.toml import dumps
+from bench.stopline import STOP_P99_MS, stops
 from legato.daemon.client import Client
-from legato.daemon.keys import Keys, make_keys, read_public, read_secret
+from legato.daemon.keys import Keys, read_secret
 
 ROUNDS, CALLS, WARM = 40, 250, 20
-STOPS, PASSES = 1000, 900
-STARTS = 7
+STARTS, COMMANDS, BLOCK_S = 7, 300, 3.0
 STATUS_P50, STATUS_P99 = 1.3, 1.5
-BUSY_P99_MS, STOP_P99_MS, STOP_MAX_MS = 20.0, 20.0, 50.0
+BUSY_P99_MS, BLOCKED_P99_MS, ACCEPTED_P99_MS = 20.0, 5.0, 5.0
 START_S, IDLE_MB = 0.6, 80.0
-LINES = ("requests", "events", "stop")
 
 FLOOR = """
 import sys, zmq
@@ -54,6 +51,7 @@ def run() -> list[Row]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         rows = [*line(folder / "plain", None), *line(folder / "curve", secrets(folder))]
+        rows += [*blocked(folder / "blocked"), *accepted(folder / "accepted")]
         rows += [*stops(folder / "stops"), *starts(folder / "starts")]
     keep("daemon", rows)
     return rows
@@ -115,27 +113,54 @@ def during(client: Client, job: str) -> list[float]:
     return found
 
 
-def stops(folder: Path) -> Iterator[Row]:
-    """Yield how long stops take at random moments of a job, by the daemon's own count too."""
-    rng = np.random.default_rng(1)
-    spent = []
+def accepted(folder: Path) -> Iterator[Row]:
+    """Yield how soon a command's new state is on disk and heard by who listens."""
     with serving(folder, None) as ends, Client(ends["requests"]) as client:
-        client.call("wait", session=client.call("run")["session"])
-        with Client(ends["stop"]) as line:
-            for number in range(STOPS):
-                # What finds the leg anew comes last: the passes need what was found.
-                jobs = ("massage", "home", "capture") if number < PASSES else ("calibrate",)
-                client.call(jobs[number % len(jobs)])
-                time.sleep(float(rng.uniform(0.0, 0.05)))
-                began = time.perf_counter()
-                line.call("stop")
-                spent.append(time.perf_counter() - began)
-                until(lambda: client.call("status")["state"] == "idle")
-            told = client.call("status")["stop"]["commanded"]
-    yield Row("daemon: stop, received to commanded, longest", told["max_ms"], "ms", STOP_MAX_MS,
-              note=f"{told['count']} stops")  # fmt: skip
+        context = zmq.Context()
+        heard = context.socket(zmq.SUB)
+        heard.subscribe(b"state")
+        heard.connect(ends["events"])
+        heard.recv_multipart()  # the present state: the subscription stands
+        spent = []
+        for _ in range(COMMANDS):
+            began = time.perf_counter()
+            client.call("home")
+            # An event leaves when its line in the record has been synced.
+            while json.loads(heard.recv_multipart()[1])["state"] != "move_home":
+                pass
+            spent.append(time.perf_counter() - began)
+            until(lambda: client.call("status")["state"] == "idle")
+        heard.close(linger=0)
+        context.term()
     late = float(1e3 * np.percentile(spent, 99))
-    yield Row("daemon: stop, asked to confirmed by the driver, p99", late, "ms")
+    yield Row("daemon: command sent to state recorded and heard, p99", late, "ms", ACCEPTED_P99_MS,
+              note=f"{COMMANDS} commands, p50 {1e3 * np.median(spent):.2f}")  # fmt: skip
+
+
+def blocked(folder: Path) -> Iterator[Row]:
+    """Yield round trips of status, and one stop, while a driver's call blocks."""
+    faults = [{"kind": "arm_blocks", "call": 1, "by": BLOCK_S}]
+    away = [150.0, 0.0, 150.0]  # home is somewhere else
+    tables = {"sim": {"time_scale": 1.0, "arm_at_mm": away, "faults": faults}}
+    with serving(folder, None, tables=tables) as ends, Client(ends["requests"]) as client:
+        client.call("home")
+        ends_at = time.monotonic() + BLOCK_S * 0.9
+        spent = []
+        while time.monotonic() < ends_at:
+            began = time.perf_counter()
+            state = client.call("status")["state"]
+            spent.append(time.perf_counter() - began)
+            assert state == "move_home", state
+            time.sleep(0.001)
+        with Client(ends["stop"]) as line:
+            asked = time.monotonic()
+            told = line.call("stop", timeout_s=0)
+        assert told["confirmed"] is None, "the call has blocked no longer"
+    late = float(1e3 * np.percentile(spent, 99))
+    yield Row("daemon: status while a driver's call blocks, p99", late, "ms", BLOCKED_P99_MS,
+              note=f"{len(spent)} calls in {0.9 * BLOCK_S:.1f} s")  # fmt: skip
+    commanded = 1e3 * (told["commanded"] - asked)
+    yield Row("daemon: stop asked to commanded, call blocked", commanded, "ms", STOP_P99_MS)
 
 
 def starts(folder: Path) -> Iterator[Row]:
@@ -167,37 +192,6 @@ def starts(folder: Path) -> Iterator[Row]:
 
 
 @contextmanager
-def serving(
-    folder: Path,
-    keys: tuple[Keys, dict[str, Any]] | None,
-    drivers: Mapping[str, str] | None = None,
-    *,
-    wait: bool = True,
-) -> Iterator[dict[str, str]]:
-    """Give the lines of a daemon of its own, and its process id; it ends with this."""
-    folder.mkdir(parents=True)
-    data: dict[str, Any] = {name: dict(table) for name, table in load(None).data.items()}
-    ends = {name: f"tcp://127.0.0.1:{port}" for name, port in zip(LINES, free_ports(), strict=True)}
-    data["server"] = ends | (keys[1] if keys is not None else {})
-    data["records"] |= {"state_dir": str(folder / "state"), "min_free_mb": 1}
-    for table, driver in (drivers or {}).items():
-        data[table]["driver"] = driver
-    data["robot"]["port"], data["camera"]["source"] = str(folder / "no-arm"), str(folder / "none")
-    config, log = folder / "cell.toml", folder / "log"
-    config.write_text(dumps(data, "Made by `python -m bench daemon`."), encoding="utf-8")
-    command = [sys.executable, "-m", "legato", "serve", "--config", str(config)]
-    with log.open("wb") as stream:
-        process = subprocess.Popen(command, stdout=stream, stderr=stream)
-    try:
-        if wait:
-            until(lambda: b'"ready"' in log.read_bytes())
-        yield ends | {"pid": str(process.pid)}
-    finally:
-        process.terminate()
-        process.wait(30.0)
-
-
-@contextmanager
 def floor(told: bytes, keys: tuple[Keys, dict[str, Any]] | None) -> Iterator[str]:
     """Give the address of a bare ROUTER that answers everything with `told`."""
     at = f"tcp://127.0.0.1:{next(free_ports())}"
@@ -215,36 +209,3 @@ def floor(told: bytes, keys: tuple[Keys, dict[str, Any]] | None) -> Iterator[str
     finally:
         process.kill()
         process.communicate()
-
-
-def secrets(folder: Path) -> tuple[Keys, dict[str, Any]]:
-    """Make the keys of a daemon and a client; return the client's, and the daemon's table."""
-    secret, public = make_keys(folder, "cell", "server")
-    mine, _ = make_keys(folder / "clients", "anna", "operator")
-    own = read_secret(mine, "")
-    keys = Keys(own.public, own.secret, read_public(public, "").public.encode())
-    return keys, {"curve": {"secret": str(secret), "clients": str(folder / "clients")}}
-
-
-def free_ports() -> Iterator[int]:
-    """Yield ports of loopback that were free a moment ago, three at most."""
-    with ExitStack() as held:
-        for _ in LINES:
-            taken = held.enter_context(socket.create_server(("127.0.0.1", 0)))
-            yield int(taken.getsockname()[1])
-
-
-def until(holds: Callable[[], bool], give_up_s: float = 60.0) -> None:
-    """Wait until something is so."""
-    give_up = time.monotonic() + give_up_s
-    while not holds():
-        assert time.monotonic() < give_up, "it has not come to be"
-        time.sleep(0.002)
-
-
-def megabytes(pid: int) -> float:
-    """Return the memory that a process holds."""
-    for text in Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines():
-        if text.startswith("VmRSS"):
-            return int(text.split()[1]) / 1024.0
-    raise ValueError(f"process {pid} has no memory")

@@ -4,6 +4,7 @@ The arm is the simulated one behind a line of 9600 baud whose time passes on the
 every @STEP and @READ costs its characters, and the reply comes after the motion.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,7 +15,7 @@ from legato.control import effects as do
 from legato.control.perceive import Calibration
 from legato.control.rehearsal import dry_run
 from legato.control.settings import CellSettings
-from legato.geometry.arm import forward, joints_from_steps
+from legato.geometry.arm import ArmModel, forward, joints_from_steps
 from legato.geometry.motion import StepMove
 from legato.geometry.transforms import Array, apply, rotation_from_vector, transform
 from legato.hal.arm import ArmReading
@@ -26,6 +27,8 @@ from tests.unit.control.cell import Bench, Mover, make_bench
 POSES = 100
 BACKLASH = 6.0
 CHARACTER_S = 10.0 / 9600.0
+PLACES = ([90.0, -170.0, 28.0], [290.0, 50.0, 60.0])
+"""Of the big face's centre: beyond what the arm reaches in every direction but up and down."""
 
 
 @dataclass
@@ -89,7 +92,7 @@ def run() -> list[Row]:
 
 def drawn(rng: np.random.Generator) -> Array:
     """Draw world_from_object: anywhere the arm might reach, yaw +-25, rise and roll +-6 deg."""
-    x, y, z = rng.uniform([95.0, -110.0, 28.0], [190.0, 10.0, 60.0])
+    x, y, z = rng.uniform(*PLACES)
     yaw, rise, roll = np.radians(np.array([90.0, 5.75, 0.0]) + rng.uniform(-1, 1, 3) * [25, 6, 6])
     turns = [[0.0, 0.0, yaw], [0.0, -rise, 0.0], [roll, 0.0, 0.0]]
     about_z, about_y, about_x = (rotation_from_vector(t) for t in turns)
@@ -146,12 +149,17 @@ def off(bench: Bench, touch: dict[str, Any], contact: dict[str, Any]) -> float:
 
 def floor(bench: Bench) -> float:
     """Return the least time without dwell: free motion at full rates, guarded steps' line."""
-    rates = np.asarray(bench.settings.arm.rates)
-    guarded = [m for m in bench.moves() if m.why is do.Why.DESCEND]
-    free = [m for m in bench.moves() if m.why is not do.Why.DESCEND]
-    motion = sum(float((np.abs(m.move.steps) / rates).max()) for m in free)
+    return least_time([m.move for m in bench.moves()], [m.why for m in bench.moves()])
+
+
+def least_time(moves: list[StepMove], whys: Sequence[str]) -> float:
+    """Return the floor of some motion commands: see `floor`."""
+    rates = np.asarray(ArmModel().rates)
+    both = list(zip(moves, whys, strict=True))
+    motion = sum(float((np.abs(m.steps) / rates).max()) for m, w in both if w != do.Why.DESCEND)
     reply = len(encode_reply(Registers((-500, -1000, 900, 300, 300, 900), 0)))
-    line = sum(len(encode(Step(m.move))) + 2 + len(encode(Read())) + reply for m in guarded)
+    guarded = [m for m, w in both if w == do.Why.DESCEND]
+    line = sum(len(encode(Step(m))) + 2 + len(encode(Read())) + reply for m in guarded)
     return motion + line * CHARACTER_S
 
 
@@ -161,10 +169,15 @@ def _failed(run: dict[str, Any]) -> bool:
 
 def chord(bench: Bench) -> Array:
     """Return how far halfway of each command the fingertip is from its straight piece, in mm."""
-    ends = np.array([[m.start, m.target] for m in bench.moves()], dtype=float)
+    return chords(bench.settings.arm, np.array([[m.start, m.target] for m in bench.moves()]))
+
+
+def chords(model: ArmModel, ends: Array) -> Array:
+    """Return the distances (N,) for the steps (N, 2, 6) at which commands start and end."""
+    ends = np.asarray(ends, dtype=float)
     points = np.stack([ends[:, 0], ends.mean(axis=1), ends[:, 1]], axis=1)
-    joints, _ = joints_from_steps(bench.settings.arm, points)
-    a, half, b = np.moveaxis(forward(bench.settings.arm, joints)[0], 1, 0)
+    joints, _ = joints_from_steps(model, points)
+    a, half, b = np.moveaxis(forward(model, joints)[0], 1, 0)
     return np.asarray(np.linalg.norm(half - (a + b) / 2.0, axis=1))
 
 
