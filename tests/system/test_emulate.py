@@ -5,108 +5,25 @@ What was touched is told by the emulator's own world, of which the daemon knows 
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from legato.cli.child import daemon
+from bench.ptypasses import massage, seen
 from legato.cli.exits import Exit
 from legato.cli.main import main
-from legato.config.load import load
-from legato.config.toml import dumps
-from legato.daemon.client import Client, RpcError
+from legato.daemon.client import RpcError
 from legato.geometry.leg import Leg
 from legato.hal.faults import Cause
-from legato.records.store import Store
+from tests.system.emulated import HOME, Cell, configuration, ended, running
 
-SCALE = 40.0
 STATIONS = (7.0, 67.0, 127.0, 187.0)
-HOME = {"xyz_mm": [127.0, 0.0, 150.0], "pitch_deg": -90.0, "roll_deg": 0.0}
-
-
-class Cell:
-    """A daemon and the emulator that its arm's driver talks to."""
-
-    def __init__(self, folder: Path, *faults: str, **sim: Any) -> None:
-        self.folder = folder
-        self.config = configuration(folder, **sim)
-        options = [part for text in faults for part in ("--fault", text)]
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "legato.cli.leash", "emulate", "--json", *options,
-             "--config", str(self.config), "--time-scale", str(SCALE),
-             "--link", str(folder / "arm"), "--truth", str(folder / "truth.json")],
-            env=os.environ | {"LEGATO_PARENT": str(os.getpid())},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )  # fmt: skip
-        assert self.process.stdout is not None
-        self.port = json.loads(self.process.stdout.readline())["port"]
-
-    def truth(self) -> dict[str, Any]:
-        """Return what truly happened so far; the emulator says when it has written it."""
-        self.process.send_signal(signal.SIGUSR1)
-        assert self.process.stderr is not None
-        for line in self.process.stderr:
-            if line.startswith("truth:"):
-                break
-        found: dict[str, Any] = json.loads((self.folder / "truth.json").read_text())
-        return found
-
-    def end(self) -> int:
-        """End the emulator and return its exit code."""
-        self.process.send_signal(signal.SIGTERM)
-        try:
-            self.process.communicate(timeout=20.0)
-        finally:
-            self.process.kill()
-        return self.process.returncode
-
-    def record(self, session: str) -> Any:
-        """Return a session's record."""
-        return Store(self.folder / "state").read(session)
-
-
-def configuration(folder: Path, **sim: Any) -> Path:
-    """Write a cell with the TeachMover's driver and the simulated camera."""
-    data: dict[str, Any] = {name: dict(table) for name, table in load().data.items()}
-    data["server"] = dict.fromkeys(("requests", "events", "stop"), "tcp://127.0.0.1:*")
-    data["records"] |= {"state_dir": str(folder / "state"), "min_free_mb": 1}
-    data["robot"] |= {"driver": "teachmover", "port": str(folder / "arm")}
-    data["massage"] |= {"dwell_s": 0.02}
-    data["sim"] |= sim
-    path = folder / "cell.toml"
-    path.write_text(dumps(data, "Made by a test."), encoding="utf-8")
-    return path
-
-
-@contextmanager
-def running(folder: Path, *faults: str, **sim: Any) -> Iterator[tuple[Cell, Client]]:
-    """Give an emulator, and a client of a daemon that drives it; the arm is referenced."""
-    cell = Cell(folder, *faults, **sim)
-    try:
-        with daemon(cell.config, folder / "daemon.log") as (_, client):
-            client.call("reference", **HOME)
-            yield cell, client
-    finally:
-        assert cell.end() == 0
-
-
-def ended(client: Client, method: str) -> dict[str, Any]:
-    """Run a job to its end and return the answer of `wait`."""
-    session = client.call(method)["session"]
-    answer: dict[str, Any] = client.call("wait", session=session, timeout_s=4.0)
-    while answer["outcome"] is None:
-        answer = client.call("wait", session=session, timeout_s=4.0)
-    return answer | {"session": session}
 
 
 def test_the_whole_job_over_the_line(tmp_path: Path) -> None:
@@ -125,6 +42,25 @@ def test_the_whole_job_over_the_line(tmp_path: Path) -> None:
     assert errors.max() <= 1.0
     assert np.sqrt((errors**2).mean()) <= 0.5
     assert truth["tip"]["xyz_mm"] == pytest.approx(HOME["xyz_mm"], abs=1.5)
+
+
+def test_a_leg_turned_and_tilted_far_from_home_is_massaged_all_the_same() -> None:
+    """At the edge of the yaw and tilt that are promised, over the line; `ptypasses` has 100."""
+    pose = {"leg_at_mm": [196.0, -95.0, 45.0], "leg_yaw_deg": 114.5, "leg_rise_deg": 11.5}
+    found = massage(5, seen(pose | {"leg_roll_deg": -5.9}))
+    assert found["outcome"] == "done", found["reason"]
+    assert len(found["errors"]) == 12
+    assert max(found["errors"]) <= 1.0
+    assert (found["bad"], found["lost"]) == (0, 0.0)
+
+
+def test_a_leg_out_of_reach_is_refused_before_the_arm_moves() -> None:
+    """Verify names the station and the joint, and not one motion has been sent."""
+    pose = {"leg_at_mm": [105.0, -63.0, 50.0], "leg_yaw_deg": 110.0, "leg_rise_deg": 3.0}
+    found = massage(5, seen(pose | {"leg_roll_deg": 0.0}))
+    assert found["outcome"] == "refused"
+    assert re.search(r"station \d+ mm: .*elbow -\d+\.\d deg is outside", found["reason"])
+    assert found["moved"] == 0
 
 
 def test_a_vanished_adapter_is_a_fault_until_reset_and_reference(tmp_path: Path) -> None:

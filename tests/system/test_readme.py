@@ -2,21 +2,28 @@
 
 import os
 import re
+import shutil
+import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+
+from tests.system.ports import default_ports
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 LEGATO = ".venv/bin/legato"
 
 
-def blocks(kind: str) -> list[str]:
-    """Return README's fenced blocks of a kind."""
-    return re.findall(rf"```{kind}\n(.*?)```", TEXT, re.DOTALL)
+def blocks(kind: str, section: str = "") -> list[str]:
+    """Return README's fenced blocks of a kind, of one section alone where its heading is given."""
+    text = TEXT.partition(section + "\n")[2].partition("\n## ")[0] if section else TEXT
+    return re.findall(rf"```{kind}\n(.*?)```", text, re.DOTALL)
 
 
 def commands() -> list[str]:
@@ -29,6 +36,13 @@ def commands() -> list[str]:
 def home(tmp_path: Path) -> dict[str, str]:
     """Return an environment whose records go to a folder that ends with the test."""
     return os.environ | {"HOME": str(tmp_path), "COLUMNS": "120"}
+
+
+@pytest.fixture
+def ports() -> Iterator[None]:
+    """Keep the default ports to this test."""
+    with default_ports():
+        yield
 
 
 def run(command: str, home: dict[str, str]) -> subprocess.CompletedProcess[str]:
@@ -45,10 +59,11 @@ def run(command: str, home: dict[str, str]) -> subprocess.CompletedProcess[str]:
     )
 
 
-def answering(home: dict[str, str]) -> None:
+def answering(home: dict[str, str], config: str | None = None) -> None:
     """Wait until the daemon answers."""
     until = time.monotonic() + 30.0
-    while run(f"{LEGATO} status", home).returncode != 0:
+    words = f"{LEGATO} status" + (f" --config {config}" if config else "")
+    while run(words, home).returncode != 0:
         assert time.monotonic() < until, "the daemon never answered"
 
 
@@ -60,6 +75,7 @@ def test_every_make_target_that_readme_names_exists() -> None:
     assert all(re.search(rf"^{target}:", makefile, re.MULTILINE) for target in named)
 
 
+@pytest.mark.usefixtures("ports")
 def test_readmes_commands_work_as_printed(home: dict[str, str]) -> None:
     """A reader who types them one after the other gets through a whole session and its report."""
     typed = [c for c in commands() if c.startswith(LEGATO)]
@@ -95,3 +111,47 @@ def test_every_file_that_readme_shows_or_names_exists() -> None:
     named = re.findall(r"`((?:etc|systemd|docs|src)/[^`*]*)`", TEXT)
     missing = [p for p in {*shown, *named} if not (ROOT / p).exists()]
     assert not missing
+
+
+def test_readmes_words_for_a_cell_without_an_arm_hold(home: dict[str, str], tmp_path: Path) -> None:
+    """Emulator, daemon, reference and run as printed, but for the places of link and sockets."""
+    link, config = str(tmp_path / "arm"), tmp_path / "emulated.toml"
+    text = (ROOT / "etc" / "emulated.toml").read_text(encoding="utf-8")
+    lines = {name: f"ipc://{tmp_path}/{name}" for name in ("requests", "events", "stop")}
+    text += "\n".join(["[server]", *(f'{name} = "{line}"' for name, line in lines.items())])
+    config.write_text(text.replace("/tmp/legato-arm", link), encoding="utf-8")
+    shutil.copy(ROOT / "etc" / "sim-intrinsics.toml", tmp_path)
+    typed = [
+        line.replace("/tmp/legato-arm", link).replace("etc/emulated.toml", str(config))
+        for line in "".join(blocks("sh", "## Without an arm")).splitlines()
+    ]
+    emulate, serve, *acts = (t.removeprefix(LEGATO).split() for t in typed)
+    with in_the_background(emulate, home) as emulator, in_the_background(serve, home) as served:
+        answering(home, str(config))
+        for words in acts:
+            done = run(" ".join(words), home)
+            assert done.returncode == 0, f"{words}: {done.stderr}"
+        assert run(f"{LEGATO} shutdown --config {config}", home).returncode == 0
+        assert served.wait(timeout=20) == 0
+        emulator.send_signal(signal.SIGINT)
+        said, _ = emulator.communicate(timeout=20)
+    assert said.splitlines()[0] == link
+    assert "12 touches, 0 breaches" in said
+
+
+@contextmanager
+def in_the_background(words: list[str], home: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
+    """Run a command in the home folder until the end of the block at the latest."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "legato", *words],
+        env=home,
+        cwd=home["HOME"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    with process:
+        try:
+            yield process
+        finally:
+            process.kill()

@@ -1,0 +1,310 @@
+"""A daemon that is killed, frozen and started again at the same addresses, and a line to it.
+
+The line is a bare DEALER that only knows JSON-RPC: it counts what is answered, and how late.
+"""
+
+import json
+import os
+import secrets
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import zmq
+
+from legato.daemon.keys import Keys
+from tests.system.emulated import HOME, configuration
+
+LINES = ("requests", "events", "stop")
+PORTS = range(15_000, 32_000)
+SERVE = ("-m", "legato", "serve", "--config")
+LEASHED = ("-m", "legato.cli.leash", "serve", "--config")
+SHORT: dict[str, dict[str, Any]] = {
+    "leg": {"stations_mm": [7.0, 67.0]},
+    "massage": {"strokes": 1},
+    "calibration": {"fresh_s": 604_800.0},
+    "robot": {"driver": "sim"},
+}
+"""A cell in this process's own memory whose run is short."""
+
+
+def addresses() -> dict[str, str]:
+    """Return three endpoints whose ports were free a moment ago.
+
+    They are none that the kernel gives to those who connect: a client that tries again and again
+    while the daemon is gone would at last be given the very port, and meet itself there.
+    """
+    found: list[int] = []
+    while len(found) < len(LINES):
+        port = secrets.choice(PORTS)
+        with suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            found += [port] if port not in found else []
+    return {name: f"tcp://127.0.0.1:{port}" for name, port in zip(LINES, found, strict=True)}
+
+
+class Attacked:
+    """`legato serve` on fixed addresses; `before` is a command line that starts Python instead."""
+
+    def __init__(
+        self,
+        folder: Path,
+        tables: Mapping[str, Mapping[str, Any]] = SHORT,
+        *,
+        before: Sequence[str] = (sys.executable,),
+        environment: Mapping[str, str] | None = None,
+        **sim: Any,
+    ) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self.folder = folder
+        self.state_dir = folder / "state"
+        self.log = folder / "daemon.log"
+        self.lines = addresses()
+        server = self.lines | dict(tables.get("server", {}))
+        self.config = configuration(folder, {**tables, "server": server}, **sim)
+        self.starts = self.mark = 0
+        self._before = tuple(before)
+        self._environment = os.environ | {"LEGATO_PARENT": str(os.getpid()), **(environment or {})}
+        self.process = self.begin()
+        self.until_listening()
+
+    def begin(self) -> "subprocess.Popen[bytes]":
+        """Start it; it appends to its log, after `mark` bytes."""
+        with self.log.open("ab") as stream:
+            self.mark = stream.tell()
+            self.process = subprocess.Popen(
+                [*self._before, *LEASHED, str(self.config)],
+                stdin=subprocess.DEVNULL,
+                stdout=stream,
+                stderr=stream,
+                env=self._environment,
+            )
+        self.starts += 1
+        return self.process
+
+    def until_listening(self, give_up_s: float = 30.0) -> None:
+        """Wait until it says that it listens; fail where it has ended instead."""
+        give_up = time.monotonic() + give_up_s
+        while not self.logged("listening", since=self.mark):
+            assert self.process.poll() is None, self.log.read_text()[-2000:]
+            assert time.monotonic() < give_up, self.log.read_text()[-2000:]
+            time.sleep(0.02)
+
+    def kill(self) -> float:
+        """Kill it as a power cut would; return the monotonic s at which it was gone."""
+        self.process.kill()
+        self.process.wait(20.0)
+        return time.monotonic()
+
+    def second(self) -> "subprocess.CompletedProcess[str]":
+        """Start another on the same configuration, and return how it ended."""
+        command = [sys.executable, *SERVE, str(self.config)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+
+    def send_signal(self, number: int) -> None:
+        """Send the process a signal."""
+        os.kill(self.process.pid, number)
+
+    def close(self) -> None:
+        """End it, whatever state it is in."""
+        if self.process.poll() is None:
+            self.send_signal(signal.SIGCONT)
+            self.process.terminate()
+        try:
+            self.process.wait(40.0)
+        finally:
+            self.process.kill()
+            self.process.wait()
+
+    def logged(self, event: str | None = None, since: int = 0) -> list[dict[str, Any]]:
+        """Return what it has logged after so many bytes, whole lines only."""
+        found = []
+        for line in self.log.read_bytes()[since:].splitlines(keepends=True):
+            if line.startswith(b"{") and line.endswith(b"\n"):
+                found.append(json.loads(line))
+        return [line for line in found if event in (None, line.get("event"))]
+
+    def said(self) -> list[str]:
+        """Return what it wrote that is no log line: a traceback, a library's complaint."""
+        lines = self.log.read_text(errors="replace").splitlines()
+        return [line for line in lines if line.strip() and not line.startswith("{")]
+
+    def orphans(self) -> list[int]:
+        """Return the processes that name this configuration, beside the one that was started."""
+        found = []
+        for entry in Path("/proc").glob("[0-9]*/cmdline"):
+            try:
+                words = entry.read_bytes().split(b"\0")
+            except OSError:
+                continue
+            pid = int(entry.parent.name)
+            if b"serve" in words and str(self.config).encode() in words:
+                found += [pid] if pid != self.process.pid else []
+        return found
+
+    def megabytes(self) -> float:
+        """Return the memory that it holds."""
+        text = Path(f"/proc/{self.process.pid}/status").read_text(encoding="ascii")
+        (line,) = (t for t in text.splitlines() if t.startswith("VmRSS"))
+        return int(line.split()[1]) / 1024.0
+
+    def descriptors(self) -> int:
+        """Return how many files and sockets it has open."""
+        return len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
+
+
+@contextmanager
+def attacked(folder: Path, *args: Any, **options: Any) -> Iterator[Attacked]:
+    """Give a daemon to attack; it ends with this."""
+    cell = Attacked(folder, *args, **options)
+    try:
+        yield cell
+    finally:
+        cell.close()
+
+
+class Line:
+    """One client of one socket, which may send much and read it later."""
+
+    def __init__(self, endpoint: str, keys: Keys | None = None) -> None:
+        self.endpoint = endpoint
+        self.pending: dict[int, tuple[str, float]] = {}
+        self.answers: dict[int, dict[str, Any]] = {}
+        self.unknown: list[Any] = []
+        """Answers to nothing that was asked, and answers that came twice."""
+        self.slowest = ("", 0.0)
+        self._keys = keys
+        self._last = 0
+        self.context = zmq.Context()
+        self.socket = self._made()
+
+    def _made(self) -> "zmq.Socket[bytes]":
+        made = self.context.socket(zmq.DEALER)
+        made.linger = 0
+        made.setsockopt(zmq.RECONNECT_IVL, 10)
+        made.setsockopt(zmq.RECONNECT_IVL_MAX, 100)
+        if self._keys is not None:
+            made.setsockopt(zmq.CURVE_PUBLICKEY, self._keys.public)
+            made.setsockopt(zmq.CURVE_SECRETKEY, self._keys.secret)
+            made.setsockopt(zmq.CURVE_SERVERKEY, self._keys.server)
+        made.connect(self.endpoint)
+        return made
+
+    def again(self) -> None:
+        """Forget what was asked, and connect anew: the daemon was another."""
+        self.socket.close(linger=0)
+        self.pending.clear()
+        self.socket = self._made()
+
+    def send(self, method: str, /, **params: Any) -> int:
+        """Send a request and return its number."""
+        self._last += 1
+        self.pending[self._last] = method, time.monotonic()
+        call = {"jsonrpc": "2.0", "id": self._last, "method": method, "params": params}
+        self.socket.send(json.dumps(call).encode())
+        return self._last
+
+    def take(self, timeout_s: float) -> bool:
+        """Take in the next answer; say whether one came."""
+        if not self.socket.poll(ceil(max(timeout_s, 0.0) * 1000.0)):
+            return False
+        answer = json.loads(self.socket.recv_multipart()[-1])
+        asked = self.pending.pop(answer.get("id"), None)
+        if asked is None:
+            if answer.get("id") is not None:
+                self.unknown.append(answer)
+            return True
+        late = time.monotonic() - asked[1]
+        if asked[0] in ("status", "ping") and late > self.slowest[1]:
+            self.slowest = asked[0], late
+        self.answers[answer["id"]] = answer
+        return True
+
+    def answer(self, number: int, timeout_s: float = 25.0) -> dict[str, Any]:
+        """Return the answer to a request. Raises TimeoutError."""
+        until = time.monotonic() + timeout_s
+        while number not in self.answers:
+            if not self.take(until - time.monotonic()):
+                raise TimeoutError(f"no answer to {self.pending.get(number)} in {timeout_s:g} s")
+        return self.answers.pop(number)
+
+    def ask(self, method: str, /, **params: Any) -> dict[str, Any]:
+        """Return the whole answer to a request."""
+        return self.answer(self.send(method, **params))
+
+    def do(self, method: str, /, **params: Any) -> dict[str, Any]:
+        """Return the result of a request that succeeds."""
+        answer = self.ask(method, **params)
+        assert "result" in answer, (method, params, answer)
+        found: dict[str, Any] = answer["result"]
+        return found
+
+    def outcome(self, session: str, within_s: float = 60.0) -> str:
+        """Return a session's outcome."""
+        until = time.monotonic() + within_s
+        while time.monotonic() < until:
+            told = self.do("wait", session=session, timeout_s=2.0)
+            if told["outcome"] is not None:
+                return str(told["outcome"])
+        raise TimeoutError(f"{session} has no outcome after {within_s:g} s")
+
+    def drain(self, timeout_s: float) -> list[str]:
+        """Take in all that is owed; return the methods that were not answered."""
+        until = time.monotonic() + timeout_s
+        while self.pending and self.take(until - time.monotonic()):
+            pass
+        return [method for method, _ in self.pending.values()]
+
+    def close(self) -> None:
+        """Let go of the socket."""
+        self.context.destroy(linger=0)
+
+
+def answering(endpoint: str, keys: Keys | None = None, give_up_s: float = 30.0) -> float:
+    """Return how long it takes until a daemon answers a client that was there before it."""
+    began = time.monotonic()
+    line = Line(endpoint, keys)
+    try:
+        line.answer(line.send("ping"), give_up_s)
+    finally:
+        line.close()
+    return time.monotonic() - began
+
+
+def brought_to_idle(line: Line, within_s: float = 30.0) -> dict[str, Any]:
+    """Reset until the cell is idle, as a person would; return its status."""
+    until = time.monotonic() + within_s
+    while time.monotonic() < until:
+        status = line.do("status")
+        if status["state"] == "idle" and not (status["campaign"] or {}).get("underway"):
+            return status
+        if status["state"] == "fault":
+            line.ask("reset")
+        else:
+            line.ask("stop")
+            time.sleep(0.02)
+    raise AssertionError(f"the cell does not become idle: {line.do('status')}")
+
+
+def ready_to_massage(line: Line, tip: Callable[[], Mapping[str, Any]] = HOME.copy) -> None:
+    """See that the arm is referenced and the leg found; `tip` tells where it truly stands."""
+    for _ in range(20):
+        status = brought_to_idle(line)
+        if not status["arm"]["referenced"]:
+            line.ask("reference", **tip())
+        if (status["calibration"] or {}).get("valid"):
+            return
+        for job in ("capture", "calibrate", "verify"):
+            begun = line.ask(job)
+            if "result" not in begun:
+                time.sleep(0.1)  # somebody has a lease, or a device is not back yet
+                break
+            if line.outcome(begun["result"]["session"]) != "done":
+                break
+    raise AssertionError(f"the cell does not become ready: {line.do('status')}")
