@@ -5,6 +5,7 @@ from typing import Final
 from legato.daemon.orders import Orders, Quit
 
 LET_GO_S: Final = 5.0  # how long a worker may take to let go of what it does
+TOLD = "the daemon was told to end"
 CLOSE_S: Final = 20.0  # how long a running job may take to retract at the end of the daemon
 
 

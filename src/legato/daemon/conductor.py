@@ -18,7 +18,7 @@ from legato.daemon.admission import (
     need_worker,
 )
 from legato.daemon.campaigns import campaigns_of
-from legato.daemon.closing import LET_GO_S, Closing
+from legato.daemon.closing import LET_GO_S, TOLD, Closing
 from legato.daemon.faulting import Faulting
 from legato.daemon.journal import Journal
 from legato.daemon.lease import Leases
@@ -193,11 +193,15 @@ class Conductor:
                 note(self._log, message)
         self._faulting.see_disk()
 
+    def wake(self, now: float) -> None:
+        """Take in the time and every stop before what else has come: a stop stops no later job."""
+        self.standing.now = now
+        self._see_gate()
+
     def tick(self, now: float) -> None:
         """Let time pass: deadlines, heartbeat, the end."""
+        self.wake(now)
         standing = self.standing
-        standing.now = now
-        self._see_gate()
         self._see_lease(now)
         if now > standing.due:
             self._faulting.fail_after_retreat(reports.deadline(standing.state, standing.in_state_s))
@@ -266,8 +270,7 @@ class Conductor:
         failure = Failure("unavailable", *end.problem) if end.problem is not None else None
         if self.tasks.ended(end.token, well=failure is None):
             standing.clear()
-        problem = end.problem[0] if end.problem is not None else None
-        self.campaigns.end_task(end.token, problem, standing.now)
+        self.campaigns.end_task(end.token, failure.reason if failure else None, standing.now)
         standing.keep()
         result = {"state": standing.state, "arm": dict(standing.view.arm)}
         self.settled.append((("task", end.token), failure or result))
@@ -292,7 +295,6 @@ class Conductor:
         """Go on ending: wait for the job, then for the worker, neither for ever."""
         running = self.standing.sessions.current is not None
         if closing.gives_up(now, running=running):
-            reason = "the daemon was told to end"
-            self._settle_session(self.standing.end("interrupted", reason, Cause.INTERRUPTED))
+            self._settle_session(self.standing.end("interrupted", TOLD, Cause.INTERRUPTED))
             running = False
         self.finished = self.finished or closing.over(now, running=running)

@@ -70,7 +70,7 @@ class Loop:
         if self._before:
             due = 0.0
         heard = dict(self._poller.poll(ceil(max(due - self._now(), 0.0) * 1000.0)))
-        self._conductor.standing.now = self._now()
+        self._conductor.wake(self._now())
         if self._mail in heard:
             for message in self._mailbox.drain():
                 self._conductor.receive(message)
@@ -97,6 +97,8 @@ class Loop:
         gate = self._conductor.gate
         if gate.number > self._stops:
             self._sort_out(gate)
+            # What these stops end is what ran before: nothing that is asked for after them.
+            self._conductor.wake(self._now())
         for _ in range(BATCH):
             arrived, stops = (
                 self._before.popleft()

@@ -117,13 +117,15 @@ class Performer:
             case Save(name, document):
                 self._save(name, dict(document))
             case Hold():
-                self._tell(paused=True)
+                self._tell(at_once=True)
                 self._orders.hold()
             case _:
                 assert_never(effect)
         return None
 
     def _enter(self, state: str) -> None:
+        # Who hears of the new state and asks is told of the arm as it now stands.
+        self._tell(at_once=True)
         self._post(StateWanted(self._writer.id, state))
         if not self._orders.entered():
             self._orders.look()
@@ -243,10 +245,10 @@ class Performer:
         self._writer.trajectory(row)
         self._written = True
 
-    def _tell(self, *, paused: bool = False, why: str | None = None) -> None:
+    def _tell(self, *, at_once: bool = False, why: str | None = None) -> None:
         """Give the loop a look at the arm, but not more often than people can see."""
         now = self._wall()
-        if now - self._told_at < TELEMETRY_S and not paused:
+        if now - self._told_at < TELEMETRY_S and not at_once:
             return
         # From when it was due, not from when it came: else motions' lengths would thin it out.
         self._told_at = max(self._told_at + TELEMETRY_S, now - TELEMETRY_S)

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 import zmq
 
+from legato.daemon.gate import present
 from legato.daemon.loop import Loop
 from legato.daemon.mailbox import Mailbox
 from legato.daemon.messages import WorkerGone
@@ -203,6 +204,26 @@ def test_a_subscriber_that_does_not_read_slows_nobody(served: Served) -> None:
     assert len(seqs) == 500
     assert seqs == sorted(seqs)
     assert stalled.poll(0)
+
+
+def test_a_stop_ends_no_job_that_was_asked_for_after_it(served: Served) -> None:
+    """Who has heard that a stop is confirmed sends a job, in the same turn of the loop: it runs."""
+    client = served.client(zmq.DEALER)
+    client.send(ping())
+    assert served.turn_until(lambda: bool(client.poll(0)))
+    client.recv()
+    gate = served.house.conductor.gate
+
+    def confirmed() -> None:
+        if not served.sockets.requests.poll(0):
+            client.send(json.dumps({"jsonrpc": "2.0", "id": 2, "method": "home"}).encode())
+        assert served.sockets.requests.poll(2000)
+
+    gate.ring = confirmed
+    gate.ask("anna", present(), estop=False)
+    assert served.turn_until(lambda: bool(client.poll(0)))
+    assert json.loads(client.recv())["result"]["state"] == "move_home"
+    assert served.house.conductor.state == "move_home"
 
 
 def test_ready_is_told_once(served: Served) -> None:
