@@ -102,6 +102,8 @@ def test_the_link_goes_with_the_emulator(tmp_path: Path) -> None:
         (["--fault", "smoke"], "no fault 'smoke'"),
         (["--fault", "silence:p=2"], "p is 0 to 1"),
         (["--time-scale", "0"], "--time-scale"),
+        (["--time-scale", "nan"], "no finite number"),
+        (["--truth", "/no/such/folder/truth.json"], "is no folder"),
         (["--baud", "14400"], "--baud"),
         (["--link", __file__], "is no link"),
         (["--config", "no-such.toml"], "no-such.toml"),

@@ -15,6 +15,7 @@ import click
 
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit, Failure
+from legato.cli.numbers import Number
 
 if TYPE_CHECKING:
     from legato.config.load import Loaded
@@ -36,7 +37,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 @command("emulate", epilog=FAULTS)
 @click.option(
     "--time-scale",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Number(min=0, min_open=True),
     default=1.0,
     show_default=True,
     help="Seconds of the cell in one of yours.",
@@ -91,6 +92,9 @@ def emulate(
     from legato.config.load import load
 
     parsed = parsed_faults(faults)
+    for place in filter(None, (link, truth)):
+        if not place.parent.is_dir():
+            raise Failure(f"{place.parent} is no folder", Exit.USAGE, "make it, or name another")
     if link is not None:
         check_link(link)
     loaded = load(context.config, need_intrinsics=False)

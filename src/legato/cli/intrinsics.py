@@ -10,6 +10,7 @@ import click
 
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit, Failure
+from legato.cli.numbers import Number
 from legato.cli.picture import read_picture
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 LEAST_MARKS = 7
 OUTLYING = 3.0  # times the median view's residual
-OUTLYING_PX = 1.0
+OUTLYING_PX = 0.1
 DOUBTED_PX = 0.1
 MOST_MARK_SIGMA = 5.0  # mm; beyond it a mark has no place at all
 MISFIT_HINT = (
@@ -41,7 +42,7 @@ HINT = "take at least ten sharp pictures with face and side in view, each from a
 )
 @click.option(
     "--mark-sigma",
-    type=click.FloatRange(0.0, MOST_MARK_SIGMA),
+    type=Number(0.0, MOST_MARK_SIGMA),
     default=0.0,
     metavar="MM",
     help="How exactly the marks were pasted on: their places are estimated too, about [leg.marks].",

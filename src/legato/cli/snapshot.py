@@ -10,6 +10,7 @@ import click
 
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit, Failure
+from legato.cli.numbers import Number
 
 if TYPE_CHECKING:
     from legato.config.load import Loaded
@@ -25,10 +26,10 @@ SCATTER_DEG = 30.0
 )
 @click.option("--views", type=click.IntRange(min=1, max=1000), default=20, show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=1000, show_default=True)
-@click.option("--scatter-mm", type=click.FloatRange(min=0), default=SCATTER_MM, show_default=True)
+@click.option("--scatter-mm", type=Number(min=0), default=SCATTER_MM, show_default=True)
 @click.option(
     "--scatter-deg",
-    type=click.FloatRange(min=0, max=180),
+    type=Number(min=0, max=180),
     default=SCATTER_DEG,
     show_default=True,
     help="Largest random yaw; rise and roll a half of it.",

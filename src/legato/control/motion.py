@@ -15,12 +15,14 @@ from legato.control.plan import pose_at, transit
 from legato.control.settings import CellSettings
 from legato.geometry.arm import Unreachable
 from legato.geometry.motion import Steps, ToolPose, move_between, rounded, straight_path
+from legato.geometry.transforms import Array
 from legato.hal.arm import ArmReading
 from legato.hal.faults import Cause
 
 Procedure = Generator[Effect, Any, Any]
 Lift = Callable[[ToolPose], ToolPose]
 PIECE_S = 0.19  # s that one piece of a slow move lasts
+IN_THE_AIR = (Why.TRANSIT, Why.APPROACH)
 
 
 class Track:
@@ -64,7 +66,12 @@ class Track:
             yield from self.read()
 
     def to(self, goal: ToolPose, why: Why, speed: float | None = None) -> Procedure:
-        """Move in a straight line to a pose, at most at `speed` mm/s; descents end on contact."""
+        """Move in a straight line to a pose, at most at `speed` mm/s; descents end on contact.
+
+        A switch that closes in the air ends in CellFault(contact_early), after the way back.
+        """
+        if why in IN_THE_AIR:
+            yield from self.look()
         here, scale = self.pose, self._settings.speed_scale
         length = float(np.linalg.norm(goal.xyz - here.xyz))
         pieces = 1 if speed is None else max(1, int(np.ceil(length / (speed * PIECE_S))))
@@ -83,9 +90,14 @@ class Track:
             least = 0.0 if speed is None else length / (speed * len(path))
             move = move_between(self._settings.arm, start, target, scale, least)
             station, until = self.touching or (None, None)
+            closed = self.contact and why is Why.TRANSIT  # who was at the leg may leave it
             self._take((yield Move(move, start, target, why, station, until)))
             if why is Why.DESCEND and self.contact:
                 return
+            if why in IN_THE_AIR and self.contact and not closed:
+                at = self.pose.xyz
+                yield from self.to(here, Why.RETRACT)
+                raise _touched(at)
 
     def travel(self, goal: ToolPose) -> Procedure:
         """Go to a pose by the transit: up to the height of home, across, down."""
@@ -102,3 +114,15 @@ class Track:
         self._memory.registers = reading.registers
         self.contact = reading.contact
         self.fresh = True
+
+
+def _touched(at: Array) -> CellFault:
+    """Return the fault of a switch that closed at `at` (3,), where nothing should be."""
+    place = ", ".join(f"{v:.0f}" for v in at)
+    return CellFault(
+        Cause.CONTACT_EARLY,
+        f"the switch closed on the way, with the fingertip at ({place}) mm by the registers",
+        "see what it touched and that the switch is free; if nothing is in the way, the arm does "
+        "not stand where it was referenced: reference it anew",
+        {"xyz_mm": [round(float(v), 1) for v in at]},
+    )

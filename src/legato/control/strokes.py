@@ -78,6 +78,7 @@ def _touch(job: Job, plan: StationPlan, stroke: int, done: int, kind: str) -> Pr
     yield Record("progress", {"text": text, **what, "done": done, "total": job.total})
     yield from track.look()
     if track.contact:
+        yield from _away(job, plan)
         raise _early(plan, job.settings.approach, "before the descent")
     track.lift, track.touching = (lambda _: plan.approach), (plan.station, None)
     height = yield from _descend(job, plan)
@@ -106,9 +107,16 @@ def _descend(job: Job, plan: StationPlan) -> Procedure:
         height = plan.height(track.pose.xyz)
     touched = (above + height) / 2.0
     if touched > massage.contact_window_mm:
-        yield from track.retreat()
+        yield from _away(job, plan)
         raise _early(plan, touched, "in the descent")
     return touched
+
+
+def _away(job: Job, plan: StationPlan) -> Procedure:
+    """Come off what was met too early: up to the approach, and as much again where need be."""
+    yield from job.track.retreat()
+    if job.track.contact:
+        yield from job.track.to(plan.at(2.0 * job.settings.approach), Why.RETRACT)
 
 
 def _contact(job: Job, plan: StationPlan, height: float) -> dict[str, Any]:

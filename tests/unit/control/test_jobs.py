@@ -103,14 +103,37 @@ def test_a_leg_that_sank_is_a_late_contact_and_the_arm_is_up(bench: Maker) -> No
     assert again is not None, "a calibration that led to a fault counts as verified"
 
 
-def test_a_leg_that_rose_is_an_early_contact_and_the_arm_is_up(bench: Maker) -> None:
-    """Contact above the window is a fault, after a retract."""
+@pytest.mark.parametrize("rise", [5.0, 9.8, 10.5, 14.0, 30.0])
+def test_a_leg_that_rose_is_an_early_contact_and_the_arm_is_up(bench: Maker, rise: float) -> None:
+    """Contact in the descent, before it, or on the way there: a light touch, back, and a fault.
+
+    An arm that stands lower than it was told meets the leg in the same way.
+    """
     cell = bench()
     higher = cell.world.world_from_object.copy()
-    higher[2, 3] += 5.0
+    higher[2, 3] += rise
     cell.world.place_leg(higher)
     with pytest.raises(do.CellFault, match="contact_early"):
         cell.run("massage")
+    assert not cell.world.switch_closed
+    assert cell.moves()[-1].why is do.Why.RETRACT
+    assert all(touch["ended_s"] is not None for touch in cell.touches())
+    assert "stall" not in str(cell.world.testimony()["breaches"])
+
+
+def test_who_stands_pressed_into_the_leg_may_leave_it(bench: Maker) -> None:
+    """After an emergency stop in a press the way home begins with the switch closed."""
+    cell = bench()
+    stopped = RuntimeError("estop")
+
+    def stop(effect: do.Effect) -> Exception | None:
+        return stopped if isinstance(effect, do.Dwell) else None
+
+    cell.interrupt = stop
+    with pytest.raises(RuntimeError):
+        cell.run("massage")
+    cell.interrupt = lambda _: None
+    assert cell.run("home") == "done"
     assert not cell.world.switch_closed
 
 
