@@ -43,7 +43,8 @@ def reflections(truth: Truth, rng: np.random.Generator, count: int) -> tuple[Gla
     """Return reflections near so many of the marks in sight."""
     pixels = mark_pixels(truth)
     names = [str(n) for n in rng.permutation(list(pixels))[:count]]
-    while count < 4 and not _sound_left(truth, names):
+    # A leg that shows neither of its faces has no such mark to leave.
+    while count < 4 and _sound_left(truth, []) and not _sound_left(truth, names):
         names = [str(n) for n in rng.permutation(list(pixels))[:count]]
     return tuple(
         Glare(pixels[n] + rng.normal(0.0, 12.0, 2), rng.uniform(6.0, 40.0), rng.uniform(0.1, 1.5))

@@ -1,6 +1,5 @@
 """`legato intrinsics`: calibrate the camera once, from ten or more pictures of the leg."""
 
-import math
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -56,7 +55,7 @@ def intrinsics(context: Context, images: tuple[Path, ...], file: Path, mark_sigm
     from legato.config.load import load
 
     loaded = load(context.config, need_intrinsics=False)
-    refuse_slips(images, file, mark_sigma)
+    refuse_slips(images, file)
     used, left_out = find_views(context, loaded, images)
     result = calibrate(context, loaded, used, left_out, mark_sigma)
     if not result.converged or result.rms_px > loaded.config.calibration.max_rms_px:
@@ -79,7 +78,7 @@ def intrinsics(context: Context, images: tuple[Path, ...], file: Path, mark_sigm
         show_marks(context, result, dict(loaded.config.leg.marks))
 
 
-def refuse_slips(images: Sequence[Path], file: Path, mark_sigma: float) -> None:
+def refuse_slips(images: Sequence[Path], file: Path) -> None:
     """Raise Failure, before anything is computed, for what is a slip of the pen."""
     missing = [str(path) for path in images if not path.exists()]
     if missing:
@@ -89,8 +88,6 @@ def refuse_slips(images: Sequence[Path], file: Path, mark_sigma: float) -> None:
         raise Failure(f"--out {file}: there is no folder {file.parent}", Exit.USAGE)
     if file.absolute() in {path.absolute() for path in images}:
         raise Failure(f"--out {file} is one of the pictures", Exit.USAGE, "name another file")
-    if not math.isfinite(mark_sigma):
-        raise Failure(f"--mark-sigma {mark_sigma}: expected a length in mm", Exit.USAGE)
 
 
 def find_views(

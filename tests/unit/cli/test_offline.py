@@ -78,7 +78,7 @@ def test_slips_are_told_before_anything_is_computed(cell: Path, picture: Path) -
     for out, sigma, why in (
         (cell.parent / "none" / "x.toml", "0", "no folder"),
         (picture, "0", "one of the pictures"),
-        (cell.parent / "x.toml", "nan", "a length in mm"),
+        (cell.parent / "x.toml", "nan", "'--mark-sigma': nan is no finite number"),
     ):
         options = ("--out", out, "--mark-sigma", sigma)
         result = run("intrinsics", "--config", cell, picture, *options)
