@@ -48,10 +48,14 @@ class CampaignFiles:
             path.unlink(missing_ok=True)
 
     def ids(self) -> list[str]:
-        """Return all ids, newest first. Raises RecordError."""
+        """Return all ids, newest first. Raises RecordError.
+
+        Of those of one second the newest is the one that was written last.
+        """
         with told("read", self.folder):
-            names = [path.stem for path in self.folder.glob("*.json")]
-        return sorted((name for name in names if SESSION_ID.fullmatch(name)), reverse=True)
+            found = {path.stem: path.stat().st_mtime_ns for path in self.folder.glob("*.json")}
+        names = filter(SESSION_ID.fullmatch, found)
+        return sorted(names, key=lambda n: (n.partition("-")[0], found[n]), reverse=True)
 
     def read(self, name: str) -> dict[str, Any] | None:
         """Return a summary, None where there is none that can be read."""
