@@ -49,7 +49,7 @@ docs: env
 browser: env
 	@command -v chromium || command -v chromium-browser || command -v google-chrome \
 		|| { [ "$$(id -u)" = 0 ] && command -v apt-get && apt-get update -qq \
-			&& apt-get install -y -qq --no-install-recommends chromium; } \
+			&& DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium; } \
 		|| $(BIN)/playwright install chromium-headless-shell
 
 # What the page takes from npm, vendored anew with licences and hashes; only this needs Node.

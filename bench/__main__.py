@@ -5,7 +5,7 @@ import sys
 
 NAMES = (
     "calibration", "paper", "pictures", "adversary", "demo", "line", "daemon", "events", "passes",
-    "ptypasses", "truetime", "stops", "faults", "unattended", "replays", "web",
+    "ptypasses", "truetime", "stops", "faults", "unattended", "booted", "replays", "web",
     "report", "machine", "abuse", "soak",
 )  # fmt: skip
 

@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from bench.row import Row, keep
 from bench.stopline import STOP_P99_MS, stops
 from legato.daemon.client import Client
 from legato.daemon.keys import Keys, read_secret
+from legato.records.store import Store
 
 ROUNDS, CALLS, WARM = 40, 250, 20
 STARTS, COMMANDS, BLOCK_S = 7, 300, 3.0
@@ -121,8 +123,9 @@ def accepted(folder: Path) -> Iterator[Row]:
         heard.subscribe(b"state")
         heard.connect(ends["events"])
         heard.recv_multipart()  # the present state: the subscription stands
-        spent = []
+        spent, bare = [], []
         for _ in range(COMMANDS):
+            bare.append(written(Store(folder / "bare"), client.call("describe")))
             began = time.perf_counter()
             client.call("home")
             # An event leaves when its line in the record has been synced.
@@ -132,9 +135,20 @@ def accepted(folder: Path) -> Iterator[Row]:
             until(lambda: client.call("status")["state"] == "idle")
         heard.close(linger=0)
         context.term()
-    late = float(1e3 * np.percentile(spent, 99))
-    yield Row("daemon: command sent to state recorded and heard, p99", late, "ms", ACCEPTED_P99_MS,
-              note=f"{COMMANDS} commands, p50 {1e3 * np.median(spent):.2f}")  # fmt: skip
+    for share, limit in ((50, None), (99, ACCEPTED_P99_MS)):
+        late, least = (float(1e3 * np.percentile(times, share)) for times in (spent, bare))
+        yield Row(f"daemon: command sent to state recorded and heard, p{share}", late, "ms", limit,
+                  peer=least, note=f"{COMMANDS} commands; beside the record alone")  # fmt: skip
+
+
+def written(store: Store, config: Any) -> float:
+    """Return how long the record of a session's beginning takes by itself, on the same disk."""
+    began, now = time.perf_counter(), datetime.now(UTC).isoformat()
+    record = store.begin({"job": "home", "started": now, "simulated": True, "config": config})
+    record.event("state", {"state": "move_home"}, t=began, wall=now, durable=True)
+    spent = time.perf_counter() - began
+    record.close()
+    return spent
 
 
 def blocked(folder: Path) -> Iterator[Row]:

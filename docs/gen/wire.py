@@ -24,6 +24,9 @@ ZeroMQ and JSON, on loopback unless keys are configured. Three sockets:
 A job's method answers at once with its session; `wait` tells how it ended. The daemon's own
 `describe` says the same as this page, and is what this page is made from.
 
+A request has at most 64 kB. A longer one is answered with `invalid_request` and the limit, up to
+256 kB; of what is longer still nothing is taken in, and its connection ends.
+
 ```python
 import zmq
 
@@ -49,7 +52,9 @@ where the stop takes the cell. A job that was sent before a stop and not yet beg
 """
 ANSWERS = """\
 `ok` means accepted. It may still be refused for what no state tells of: `precondition`,
-`unavailable`, `expired`, `not_authorised`, and `busy` for a lease.
+`unavailable`, `expired`, `not_authorised`, and `busy` for a lease. Which jobs an idle cell would
+refuse for want of a device, a picture, a reference or a calibration stands in `status` under
+`lacking`, with reason and hint.
 """
 CAMPAIGNS = """\
 `campaign` repeats a job until `count` repetitions have begun, until `for_s` of the cell's time are

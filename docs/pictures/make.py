@@ -1,6 +1,7 @@
-"""Make README's pictures anew: `python docs/pictures/make.py`, with chromium on the PATH.
+"""Make README's pictures anew: `python docs/pictures/make.py`, with chromium and pdftoppm.
 
-Runs `legato demo` in a folder of its own, then photographs what it prints and its report.
+Runs `legato demo` in a folder of its own, then photographs what it prints and its report, the
+first pages of the report as PDF, and the comparison with runs on other legs.
 """
 
 import json
@@ -9,9 +10,13 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
+from matplotlib.image import imread, imsave
 from rich.ansi import AnsiDecoder
 from rich.console import Console
 
+SEEDS = ("1", "2", "3", "4", "5")
+PAGES, DPI = 4, 56
 HERE = Path(__file__).resolve().parent
 FLAGS = (
     "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --hide-scrollbars "
@@ -20,7 +25,7 @@ FLAGS = (
 
 
 def main() -> None:
-    """Write demo.png and report.png beside this file."""
+    """Write demo.png, report.png, pdf.png and compare.png beside this file."""
     with tempfile.TemporaryDirectory() as folder:
         demo = [sys.executable, "-m", "legato", "demo", "--out", folder]
         shown = subprocess.run(
@@ -34,7 +39,29 @@ def main() -> None:
         page = Path(folder) / "demo.svg"
         console.save_svg(str(page), title="make demo")
         photograph(page.as_uri(), HERE / "demo.png", (1240, 1020), folder)
-        photograph(Path(said["report"]).as_uri(), HERE / "report.png", (1100, 1830), folder)
+        photograph(Path(said["report"]).as_uri(), HERE / "report.png", (1100, 1490), folder)
+        paper(folder)
+        for seed in SEEDS[1:]:
+            legato("demo", "--out", folder, "--seed", seed)
+        page = Path(folder) / "compare.html"
+        legato("compare", "--last", str(len(SEEDS)), "-o", str(page), "--state-dir", folder)
+        photograph(page.as_uri(), HERE / "compare.png", (1100, 1380), folder)
+
+
+def paper(folder: str) -> None:
+    """Write the first pages of the latest session's PDF, side by side, as pdf.png."""
+    file = Path(folder) / "report.pdf"
+    legato("report", "--pdf", "-o", str(file), "--state-dir", folder)
+    command = ["pdftoppm", "-png", "-r", str(DPI), "-l", str(PAGES), str(file), f"{folder}/page"]
+    subprocess.run(command, check=True, capture_output=True)
+    pages = [imread(page) for page in sorted(Path(folder).glob("page-*.png"))]
+    framed = [np.pad(page, ((6, 6), (6, 6), (0, 0)), constant_values=0.85) for page in pages]
+    imsave(HERE / "pdf.png", np.concatenate(framed, axis=1))
+
+
+def legato(*words: str) -> None:
+    """Run one command."""
+    subprocess.run([sys.executable, "-m", "legato", *words], check=True, capture_output=True)
 
 
 def photograph(address: str, picture: Path, size: tuple[int, int], folder: str) -> None:

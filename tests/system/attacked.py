@@ -24,6 +24,7 @@ from tests.system.emulated import HOME, configuration
 
 LINES = ("requests", "events", "stop")
 PORTS = range(15_000, 32_000)
+LOOK_S = 0.5  # between two looks at whether it still runs
 SERVE = ("-m", "legato", "serve", "--config")
 LEASHED = ("-m", "legato.cli.leash", "serve", "--config")
 SHORT: dict[str, dict[str, Any]] = {
@@ -35,18 +36,40 @@ SHORT: dict[str, dict[str, Any]] = {
 """A cell in this process's own memory whose run is short."""
 
 
-def addresses() -> dict[str, str]:
-    """Return three endpoints whose ports were free a moment ago.
+class Places:
+    """Three endpoints that no other is given until `close`, while their daemon is gone either.
 
-    They are none that the kernel gives to those who connect: a client that tries again and again
-    while the daemon is gone would at last be given the very port, and meet itself there.
+    A socket that is bound and never listens keeps each port. They are none that the kernel gives
+    to those who connect: a client that tries again and again while the daemon is gone would at
+    last be given the very port, and meet itself there.
     """
-    found: list[int] = []
-    while len(found) < len(LINES):
-        port = secrets.choice(PORTS)
-        with suppress(OSError), socket.create_server(("127.0.0.1", port)):
-            found += [port] if port not in found else []
-    return {name: f"tcp://127.0.0.1:{port}" for name, port in zip(LINES, found, strict=True)}
+
+    def __init__(self) -> None:
+        self._kept = [_kept_port() for _ in LINES]
+        ports = [kept.getsockname()[1] for kept in self._kept]
+        self.lines = {
+            name: f"tcp://127.0.0.1:{port}" for name, port in zip(LINES, ports, strict=True)
+        }
+
+    def close(self) -> None:
+        """Let others have them."""
+        for kept in self._kept:
+            kept.close()
+
+
+def _kept_port() -> socket.socket:
+    """Return a socket that is bound to a port of its own, which a daemon may bind as well."""
+    for _ in range(1000):
+        kept = socket.socket()
+        try:
+            kept.bind(("127.0.0.1", secrets.choice(PORTS)))
+        except OSError:
+            kept.close()
+            continue
+        # Set afterwards: it lets in whoever sets it, and had to find the port free itself.
+        kept.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        return kept
+    raise OSError("no port is free")
 
 
 class Attacked:
@@ -65,7 +88,8 @@ class Attacked:
         self.folder = folder
         self.state_dir = folder / "state"
         self.log = folder / "daemon.log"
-        self.lines = addresses()
+        self._places = Places()
+        self.lines = self._places.lines
         server = self.lines | dict(tables.get("server", {}))
         self.config = configuration(folder, {**tables, "server": server}, **sim)
         self.starts = self.mark = 0
@@ -121,6 +145,23 @@ class Attacked:
         finally:
             self.process.kill()
             self.process.wait()
+            self._places.close()
+
+    def answer(self, line: "Line", number: int, give_up_s: float) -> dict[str, Any]:
+        """Return the answer to a request; raises TimeoutError, and AssertionError if it ends."""
+        until = time.monotonic() + give_up_s
+        while (left := until - time.monotonic()) > 0:
+            with suppress(TimeoutError):
+                return line.answer(number, min(left, LOOK_S))
+            assert self.process.poll() is None, f"it ended with {self.process.returncode}"
+        raise TimeoutError(f"no answer to {line.pending.get(number)} in {give_up_s:g} s")
+
+    def back(self, line: "Line", give_up_s: float = 30.0) -> tuple[dict[str, Any], float]:
+        """Return what status first says after `begin`, and how long that took."""
+        began, before = time.monotonic(), line.slowest
+        answer = self.answer(line, line.send("status"), give_up_s)
+        line.slowest = before  # a start is no answer's latency
+        return answer, time.monotonic() - began
 
     def logged(self, event: str | None = None, since: int = 0) -> list[dict[str, Any]]:
         """Return what it has logged after so many bytes, whole lines only."""

@@ -4,15 +4,19 @@ Hypothesis draws what it does. What the daemon answers is held against what was 
 an example ends, everything it has left on the disk is judged.
 """
 
+import shutil
 import signal
+import sys
 import time
-from collections import Counter
+import traceback
+from collections import Counter, deque
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import zmq
 from hypothesis import HealthCheck, Phase, settings
+from hypothesis import seed as hypothesis_seed
 from hypothesis import strategies as st
 from hypothesis.stateful import (
     RuleBasedStateMachine,
@@ -29,6 +33,7 @@ from tests.system.emulated import HOME, Cell
 STATIONS = (7.0, 67.0)
 ANSWER_S = 5.0  # until status has to be answered, on a machine that is busy with something else
 BUGS = ("bug", "worker_gone", "not_tidied")
+TRAIL, KEPT_BYTES, KEPT_SESSIONS = 2000, 2_000_000, 8  # of what a violation leaves
 KNOWN = {
     -32700, -32600, -32601, -32602, -32000, -32001, -32002, -32003, -32004, -32005, -32006,
 }  # fmt: skip
@@ -63,9 +68,16 @@ LINE_FAULTS = (
 class Ward:
     """The daemon that all examples share, and what is known of its life."""
 
-    def __init__(self, cell: Attacked, emulator: Cell | None = None) -> None:
+    def __init__(
+        self, cell: Attacked, emulator: Cell | None = None, evidence: Path | None = None
+    ) -> None:
         self.cell = cell
         self.emulator = emulator
+        self.evidence = evidence
+        self.broken: str | None = None
+        self.trail: deque[str] = deque(maxlen=TRAIL)
+        self.backs: list[float] = []
+        """How long each start took to its first answer."""
         self.steps = 0
         self.done: Counter[str] = Counter()
         self.outcomes: Counter[str] = Counter()
@@ -79,6 +91,32 @@ class Ward:
     def tip(self) -> dict[str, Any]:
         """Return where the arm truly stands, for referencing it."""
         return dict(self.emulator.truth()["tip"]) if self.emulator is not None else dict(HOME)
+
+    def say(self, text: str) -> None:
+        """Take down one thing that was done, or answered."""
+        self.trail.append(f"{time.monotonic():.3f} {self.steps} {text}")
+
+    def broke_off(self, error: Exception) -> None:
+        """Keep what the first violation was, and all that shows how it came about."""
+        if self.broken is not None:
+            return
+        self.broken = "".join(traceback.format_exception(error))
+        if self.evidence is None:
+            return
+        folder, cell = self.evidence, self.cell
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        code = cell.process.poll()
+        ended = f"the daemon has ended with {code}" if code is not None else "the daemon runs"
+        (folder / "violation.txt").write_text(f"{self.broken}\n{ended}\n")
+        (folder / "steps.txt").write_text("\n".join(self.trail) + "\n")
+        (folder / "daemon.log").write_bytes(cell.log.read_bytes()[-KEPT_BYTES:])
+        (folder / "cell.toml").write_bytes(cell.config.read_bytes())
+        if self.emulator is not None:
+            line = (self.emulator.folder / "line.txt").read_bytes()
+            (folder / "line.txt").write_bytes(line[-KEPT_BYTES:])
+        for path in judge.folders(cell.state_dir)[-KEPT_SESSIONS:]:
+            shutil.copytree(path, folder / "sessions" / path.name, symlinks=True)
 
     def fresh(self) -> list[Path]:
         """Return the sessions that have not been judged, and take them for judged."""
@@ -317,7 +355,7 @@ class Client(RuleBasedStateMachine):
         for line in (self.line, self.stops):
             line.again()
         self.lease, self.fault, self.loose = None, None, False
-        status = self._status(20.0)
+        status = self._status(back=True)
         if how == "kill" and running is not None and self._told(running) == "interrupted":
             assert status["fault"]["cause"] == "interrupted", status
         self.fault = status["fault"]
@@ -325,31 +363,40 @@ class Client(RuleBasedStateMachine):
     # What always holds.
 
     def teardown(self) -> None:
-        """End the example: all is answered, all has ended, and what is on the disk is sound."""
+        """End the example; what breaks off is kept as it was, before hypothesis tries it again."""
         if not self.came:
             return
+        broken = sys.exc_info()[1]  # what a rule has raised
         try:
-            owed = self.line.drain(25.0)
-            assert not owed, f"never answered: {owed}"
-            assert not self.line.unknown, self.line.unknown[:3]
-            time.sleep(
-                0.35
-            )  # a lease that is held ends by itself, or is longer and its token known
-            if self.lease is not None:
-                self._ask("lease", duration_s=0.0, lease=self.lease)
-            self._ask("end_campaign")
-            self._ask("stop")
-            self.fault = None
-            for session in self.accepted:
-                self.ward.outcomes[self.line.outcome(session)] += 1
-                self.ward.causes[str(self.line.do("session", session=session)["cause"])] += 1
-            status = brought_to_idle(self.line)
-            assert status["fault"] is None
-            self._judge()
+            if isinstance(broken, Exception):
+                self.ward.broke_off(broken)
+            else:
+                self._ends()
+        except Exception as error:
+            self.ward.broke_off(error)
+            raise
         finally:
             self.ward.slowest = max(self.ward.slowest, self.line.slowest[1])
             self.line.close()
             self.stops.close()
+
+    def _ends(self) -> None:
+        """See that all is answered, all has ended, and what is on the disk is sound."""
+        owed = self.line.drain(25.0)
+        assert not owed, f"never answered: {owed}"
+        assert not self.line.unknown, self.line.unknown[:3]
+        time.sleep(0.35)  # a lease that is held ends by itself, or is longer and its token known
+        if self.lease is not None:
+            self._ask("lease", duration_s=0.0, lease=self.lease)
+        self._ask("end_campaign")
+        self._ask("stop")
+        self.fault = None
+        for session in self.accepted:
+            self.ward.outcomes[self.line.outcome(session)] += 1
+            self.ward.causes[str(self.line.do("session", session=session)["cause"])] += 1
+        status = brought_to_idle(self.line)
+        assert status["fault"] is None
+        self._judge()
 
     def _judge(self) -> None:
         """Hold what the example has left to the invariants."""
@@ -382,26 +429,36 @@ class Client(RuleBasedStateMachine):
     def _did(self, what: str) -> None:
         self.ward.steps += 1
         self.ward.done[what] += 1
+        self.ward.say(what)
 
     def _token(self) -> dict[str, Any]:
         return {"lease": self.lease} if self.lease is not None else {}
 
     def _ask(self, method: str, **params: Any) -> dict[str, Any]:
         """Return the answer to a request, which is a result or a refusal that is documented."""
-        answer = self.line.ask(method, **params)
+        number = self.line.send(method, **params)
+        answer = self.cell.answer(self.line, number, 25.0)
         if "error" in answer:
             error = answer["error"]
+            self.ward.say(f"{method} {params}: {error['message']}: {error['data']}")
             assert error["code"] in KNOWN, (method, params, error)
             assert error["data"]["reason"], (method, error)
             if error["message"] == "expired" and method != "lease":
                 self.lease = None
+        else:
+            self.ward.say(f"{method} {params}: {str(answer['result'])[:300]}")
         return answer
 
-    def _status(self, within_s: float = ANSWER_S) -> dict[str, Any]:
+    def _status(self, *, back: bool = False) -> dict[str, Any]:
         """Look, and see that a fault is latched until somebody resets."""
-        answer = self.line.answer(self.line.send("status"), within_s)
+        if back:
+            answer, took = self.cell.back(self.line)
+            self.ward.backs.append(took)
+        else:
+            answer = self.cell.answer(self.line, self.line.send("status"), ANSWER_S)
         status: dict[str, Any] = answer["result"]
         fault = status["fault"]
+        self.ward.say(f"status: {status['state']} {status['session']} {fault} {status['campaign']}")
         assert (fault is not None) == (status["state"] == "fault"), status
         repeating = bool((status["campaign"] or {}).get("underway"))
         owed = any(method == "reset" for method, _ in self.line.pending.values())
@@ -421,19 +478,22 @@ class Client(RuleBasedStateMachine):
         return str(outcome) if outcome is not None else None
 
 
-def let_loose(ward: Ward, examples: int, steps: int, *, derandomize: bool) -> None:
-    """Have `examples` clients do `steps` things each; raises what the first violation raises."""
+def let_loose(ward: Ward, examples: int, steps: int, *, seed: int | None = None) -> None:
+    """Have `examples` clients do `steps` things each; raises what the first violation raises.
+
+    Without a `seed` they do the same each time.
+    """
 
     class Loose(Client):
         pass
 
     Loose.ward = ward
     run_state_machine_as_test(
-        Loose,
+        Loose if seed is None else hypothesis_seed(seed)(Loose),
         settings=settings(
             max_examples=examples,
             stateful_step_count=steps,
-            derandomize=derandomize,
+            derandomize=seed is None,
             database=None,
             deadline=None,
             # What a daemon did once it need not do again: nothing is made smaller.

@@ -27,11 +27,17 @@ RUN = ["capture", "calibrate", "verify", "move_home", "massage_7", "massage_67",
        "massage_187", "move_home", "idle"]  # fmt: skip
 LOOK = """
 window.seenStates = [];
+window.contradictions = [];
 addEventListener('DOMContentLoaded', () => {
   const look = () => {
     const state = document.body.dataset.state;
     if (state && window.seenStates.at(-1) !== state) window.seenStates.push(state);
+    const doing = document.querySelector('#doing')?.textContent ?? '';
+    const pressing = /press|draw/.test(doing) && !state.startsWith('massage_');
+    if (pressing) window.contradictions.push(`${state}: ${doing}`);
   };
+  const text = {childList: true, characterData: true, subtree: true};
+  new MutationObserver(look).observe(document.querySelector('#doing'), text);
   new MutationObserver(look).observe(document.body, {attributeFilter: ['data-state']});
 });
 """

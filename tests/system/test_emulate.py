@@ -59,7 +59,7 @@ def test_a_leg_out_of_reach_is_refused_before_the_arm_moves() -> None:
     pose = {"leg_at_mm": [105.0, -63.0, 50.0], "leg_yaw_deg": 110.0, "leg_rise_deg": 3.0}
     found = massage(5, seen(pose | {"leg_roll_deg": 0.0}))
     assert found["outcome"] == "refused"
-    assert re.search(r"station \d+ mm: .*elbow -\d+\.\d deg is outside", found["reason"])
+    assert re.search(r"station \d+ mm: .*elbow -\d+\.\d+ deg is outside", found["reason"])
     assert found["moved"] == 0
 
 
@@ -88,9 +88,13 @@ def test_a_vanished_adapter_is_a_fault_until_reset_and_reference(tmp_path: Path)
 
 
 def test_the_link_goes_with_the_emulator(tmp_path: Path) -> None:
-    """At SIGTERM the emulator ends with 0, its truth written and its link gone."""
+    """No second emulator takes it; at SIGTERM this one ends with 0, truth written, link gone."""
     cell = Cell(tmp_path)
-    assert (tmp_path / "arm").is_symlink()
+    port = (tmp_path / "arm").readlink()
+    second = CliRunner().invoke(main, ["emulate", "--link", str(tmp_path / "arm")])
+    assert (second.exit_code, second.stdout) == (Exit.USAGE, "")
+    assert "another emulator keeps the link" in second.stderr
+    assert (tmp_path / "arm").readlink() == port
     assert cell.end() == 0
     assert not (tmp_path / "arm").is_symlink()
     assert json.loads((tmp_path / "truth.json").read_text())["simulated"] is True
@@ -101,6 +105,7 @@ def test_the_link_goes_with_the_emulator(tmp_path: Path) -> None:
     [
         (["--fault", "smoke"], "no fault 'smoke'"),
         (["--fault", "silence:p=2"], "p is 0 to 1"),
+        (["--fault", "silence:after=1,after=3"], "after stands twice"),
         (["--time-scale", "0"], "--time-scale"),
         (["--time-scale", "nan"], "no finite number"),
         (["--truth", "/no/such/folder/truth.json"], "is no folder"),

@@ -12,7 +12,7 @@ def test_anything_at_any_moment_in_process(tmp_path: Path) -> None:
     """Devices that go wrong by lot, an arm in the daemon's own memory: every invariant holds."""
     with attacked(tmp_path, SHORT, time_scale=400.0, faults=SIM_FAULTS) as cell:
         ward = Ward(cell)
-        let_loose(ward, 3, 32, derandomize=True)
+        let_loose(ward, 3, 32)
         assert ward.steps >= 60
 
 
@@ -22,7 +22,7 @@ def test_anything_at_any_moment_over_the_line(tmp_path: Path) -> None:
     try:
         with attacked(tmp_path, TABLES) as cell:
             ward = Ward(cell, emulator)
-            let_loose(ward, 2, 34, derandomize=True)
+            let_loose(ward, 2, 34)
             assert ward.steps >= 30
     finally:
         assert emulator.end() == 0

@@ -3,12 +3,14 @@
 import json
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from legato.config.toml import dumps
 from legato.daemon.client import Client
 from legato.records.store import Store
 from tests.system.process import Daemon, configuration, daemon
@@ -82,6 +84,22 @@ def test_stopping_during_a_solve_is_not_held_up(shared: Daemon, stops: Client) -
     assert stops.call("ping")["state"] in ("calibrate", "idle")
     assert stops.call("estop")["confirmed"] is not None
     assert shared.wait(session) in ("fault", "done")
+
+
+def test_a_search_that_would_last_for_hours_ends_at_a_stop(tmp_path: Path) -> None:
+    """The job ends as stopped, long before the state's deadline, and the next can begin."""
+    config = configuration(tmp_path, seed=1)
+    data = tomllib.loads(config.read_text())
+    data["calibration"] |= {"engine": "paper", "population": 10_000, "generations": 100_000}
+    config.write_text(dumps(data, "Made by a test."))
+    with daemon(config) as cell:
+        cell.wait(cell.do("capture")["session"])
+        session = cell.do("calibrate")["session"]
+        cell.event("state", state="calibrate")
+        cell.event("telemetry")  # the search begins
+        cell.do("stop")
+        assert cell.wait(session) == "stopped"
+        assert cell.wait(cell.do("home")["session"]) == "done"
 
 
 def test_the_commands_go_the_stop_line(shared: Daemon, folder: Path) -> None:

@@ -18,7 +18,7 @@ from tests.system.attacked import (
     SHORT,
     Attacked,
     Line,
-    addresses,
+    Places,
     attacked,
     ready_to_massage,
 )
@@ -131,7 +131,8 @@ def test_a_folder_that_becomes_read_only_is_a_refusal_with_a_hint(tmp_path: Path
 
 def test_nobody_reading_its_log_is_no_end(tmp_path: Path) -> None:
     """A pipe whose reader has gone takes no line; the daemon goes on, and ends cleanly."""
-    lines = addresses()
+    places = Places()
+    lines = places.lines
     config = configuration(tmp_path, {**SHORT, "server": lines})
     receive, send = os.pipe()
     with subprocess.Popen([sys.executable, *SERVE, str(config)], stderr=send) as process:
@@ -145,6 +146,37 @@ def test_nobody_reading_its_log_is_no_end(tmp_path: Path) -> None:
         finally:
             line.close()
             process.kill()
+            places.close()
+
+
+def test_a_log_that_nobody_reads_holds_nobody_up(tmp_path: Path) -> None:
+    """A pipe that is full: requests, jobs and stops are answered as ever, and it ends in order."""
+    places = Places()
+    lines = places.lines
+    config = configuration(tmp_path, {**SHORT, "server": lines}, time_scale=400.0)
+    receive, send = os.pipe()
+    with subprocess.Popen([sys.executable, *SERVE, str(config)], stderr=send) as process:
+        os.close(send)
+        line, stops = Line(lines["requests"]), Line(lines["stop"])
+        try:
+            for _ in range(1000):  # far more than the pipe's 64 kB of log
+                line.send("session", session="x" * 128)
+            assert line.drain(30.0) == []
+            assert line.do("status")["state"] == "idle"
+            assert stops.do("stop")["received"]
+            assert line.outcome(line.do("home")["session"]) == "done"
+            line.do("shutdown")
+            process.wait(20.0)
+            assert process.returncode == 0
+        finally:
+            line.close()
+            stops.close()
+            process.kill()
+            places.close()
+    with os.fdopen(receive, "rb") as stream:
+        told = stream.read()
+    assert len(told) >= 60_000, "it was full"
+    assert b'"listening"' in told
 
 
 def test_a_camera_unplugged_in_a_job_and_plugged_in_again(tmp_path: Path) -> None:

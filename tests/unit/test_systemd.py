@@ -29,6 +29,24 @@ def test_its_exposure_was_measured_of_this_very_unit_and_is_low() -> None:
     assert rows["unattended: complaints of systemd-analyze verify"] == 0
 
 
+def test_a_real_systemd_has_started_this_very_unit() -> None:
+    """`python -m bench booted` boots one: jobs, stop, kill, freeze and refusal went as designed."""
+    result = json.loads((ROOT / "docs/bench/booted.json").read_text(encoding="utf-8"))
+    now = hashlib.sha256(UNIT.read_bytes()).hexdigest()
+    assert result["unit_sha256"] == now, "the unit has changed: run `python -m bench booted`"
+    rows = {row["name"]: row["value"] for row in result["rows"]}
+    assert rows["booted: units started by a real systemd"] == 1
+    assert rows["booted: what was not as designed"] == 0
+
+
+def test_zeromq_may_do_what_it_cannot_do_without() -> None:
+    """It ends the process where its threads may not be scheduled, or addresses not be looked up."""
+    unit = directives()
+    assert unit["SystemCallFilter"][-1] == "sched_setscheduler"
+    assert "AF_NETLINK" in unit["RestrictAddressFamilies"][0].split()
+    assert unit["RestrictRealtime"] == ["yes"], "the scheduler's other classes stay out of reach"
+
+
 def test_systemd_waits_watches_and_gives_up() -> None:
     """Type=notify with a watchdog; restarts have a budget; a refused configuration has none."""
     unit = directives()

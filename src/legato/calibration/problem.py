@@ -5,7 +5,7 @@ f, s_x, s_y, u0, v0, t_x, t_y, t_z (mm), omega, phi, kappa (rad).
 f, s_x and s_y are not separately observable: only alpha_u = f s_x and alpha_v = f s_y are.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -61,11 +61,16 @@ class Problem:
     size: tuple[int, int] = (768, 576)  # width and height of the picture in px
 
 
+def go_on() -> None:
+    """Let a search go on."""
+
+
 @dataclass(frozen=True)
 class EngineSettings:
     """Settings of the genetic search.
 
-    The paper names no population, rates, c, a or eta: these are ours, measured best.
+    The paper names no population, rates, c, a or eta: these are ours, measured best. `heed` is
+    called before each generation; what it raises ends the search.
     """
 
     population: int = 200
@@ -81,6 +86,7 @@ class EngineSettings:
     search_population: int = 60  # hybrid: the short search before refinement
     search_generations: int = 15
     search_elites: int = 12
+    heed: Callable[[], None] = go_on
 
 
 @dataclass(frozen=True)

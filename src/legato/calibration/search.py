@@ -56,6 +56,7 @@ def evolve(
     best, mean = [float(costs[0])], [_finite_mean(costs)]
     anchor, since = genes[0], 0
     for generation in range(1, settings.generations + 1):
+        settings.heed()
         parents = roulette(rng, chances, n)
         children = crossover(rng, genes[parents], costs[parents], settings.crossover_rate, wrap)
         children = mutation(

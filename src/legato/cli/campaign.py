@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from legato.cli.command import Context, command
-from legato.cli.events import line_of
 from legato.cli.exits import Exit, Failure, exit_of
 from legato.cli.follow import LISTEN_S, Interrupts, ask_stop, interrupts
 from legato.cli.jobs import JOBS
 from legato.cli.line import connected
 from legato.cli.output import Output
 from legato.cli.store import state_dir_option
+from legato.report.lines import line_of
 
 if TYPE_CHECKING:
     from legato.daemon.client import Client

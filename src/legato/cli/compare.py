@@ -73,7 +73,7 @@ def show(context: Context, found: "Comparison") -> None:
     if found.mixed:
         out.say("simulated and real sessions stand side by side: their figures differ in meaning")
     out.table(
-        ("no.", "session", "job", "outcome", "cell", "s", "rms px", "1 sigma mm", "true mm"),
+        ("no.", "session", "job", "outcome", "cell", "wall s", "rms px", "1 sigma mm", "true mm"),
         [
             (s.number, s.id, s.job, s.outcome, "simulated" if s.simulated else "real",
              s.seconds, s.rms_px, s.sigma_mm, s.error_mm)
@@ -86,9 +86,12 @@ def show(context: Context, found: "Comparison") -> None:
             ("station mm", "mean mm", "between sessions sd mm", "within sd mm", "range mm"),
             [(f"{t.station_mm:g}", t.mean, t.between, t.within, t.span) for t in found.stations],
         )
-    if found.pose_sd_mm is not None:
+    if found.pose_sd_mm is not None and found.pose_sd_deg is not None:
+        shift, turn = (
+            ", ".join(f"{v:.3g}" for v in sd) for sd in (found.pose_sd_mm, found.pose_sd_deg)
+        )
         out.say("")
-        out.say("leg found, sd: " + ", ".join(f"{v:.3f}" for v in found.pose_sd_mm) + " mm")
+        out.say(f"leg found, sd: {shift} mm along x y z, {turn} deg about them")
     if found.differences:
         out.say("")
         keys = [(d.key, *d.values) for d in found.differences[:20]]

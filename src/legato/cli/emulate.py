@@ -15,6 +15,7 @@ import click
 
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit, Failure
+from legato.cli.link import check_link, kept, relink
 from legato.cli.numbers import Number
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def emulate(
     stopping = threading.Event()
     arm, emulator = build(loaded, time_scale, int(baud) if baud else None, parsed, seed, stopping)
     told = Told(context, arm, emulator, link, truth)
-    with signals() as next_signal, tapped(line) as passed:
+    with signals() as next_signal, tapped(line) as passed, kept(link):
         try:
             run(told, passed, stopping, next_signal)
         finally:
@@ -263,19 +264,6 @@ def signals() -> Iterator[Callable[[], int]]:
             signal.signal(number, handler)
         os.close(receive)
         os.close(send)
-
-
-def check_link(link: Path) -> None:
-    """Raise Failure where a link cannot be put because something else is in its place."""
-    if link.exists() and not link.is_symlink():
-        raise Failure(f"{link} exists and is no link", Exit.USAGE, "name another --link")
-
-
-def relink(link: Path, path: str) -> None:
-    """Point a symbolic link at a path."""
-    fresh = link.with_name(f".{link.name}.{os.getpid()}")
-    fresh.symlink_to(path)
-    fresh.replace(link)
 
 
 def replace(file: Path, text: str) -> None:

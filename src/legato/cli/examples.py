@@ -24,7 +24,10 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         ("legato run --no-wait --key morning", "start it once, however often this is sent"),
     ),
     "capture": (("legato capture", "take a picture"),),
-    "calibrate": (("legato calibrate", "find the leg in it"),),
+    "calibrate": (
+        ("legato calibrate", "find the leg in it"),
+        ("legato calibrate --picks picks.json", "near the marks that a person has named in it"),
+    ),
     "verify": (("legato verify --json", "may the calibration be used?"),),
     "home": (("legato home", "park the arm"),),
     "massage": (("legato massage", "press with the calibration that was verified"),),
@@ -41,6 +44,10 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
     "reference": (
         ("legato reference", "the arm stands at robot.start"),
         ("legato reference --xyz 127 0 150", "it stands elsewhere: mm in the robot's frame"),
+    ),
+    "lease": (
+        ("legato lease legato run", "a job that nobody else can interfere with, but for a stop"),
+        ("legato lease --deadman sh night.sh", "a script; should it die, the arm is paused"),
     ),
     "watch": (
         ("legato watch", "a live screen"),

@@ -18,8 +18,8 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from legato.cli.events import line_of
 from legato.cli.output import Output
+from legato.report.lines import line_of
 
 if TYPE_CHECKING:
     from legato.daemon.client import Client

@@ -1,6 +1,8 @@
 """`legato run capture calibrate verify home massage`: start a job and follow it to its end."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -8,6 +10,7 @@ from legato.cli.command import Context, command
 from legato.cli.exits import Exit, exit_of
 from legato.cli.follow import follow
 from legato.cli.line import connected
+from legato.cli.picture import picks_option, read_picks
 
 if TYPE_CHECKING:
     from legato.daemon.client import Client
@@ -15,11 +18,12 @@ if TYPE_CHECKING:
 JOBS = {
     "run": "Find the leg, verify, go home, massage every station, go home.",
     "capture": "Take a picture.",
-    "calibrate": "Find the leg in the picture that was taken.",
+    "calibrate": "Find the leg in the picture that was taken, or in a new one.",
     "verify": "Decide whether the calibration may be used.",
     "home": "Go to the parked pose.",
     "massage": "Massage every station with the verified calibration.",
 }
+PICKING = ("run", "calibrate")  # what finds the leg, and so can be told where its marks are
 TAIL = "\n\nShows progress until the job ends; Ctrl-C asks for a stop, a second one leaves."
 
 
@@ -29,17 +33,21 @@ def job_command(name: str, help_text: str) -> click.Command:
     @command(name, help=help_text + TAIL)
     @click.option("--no-wait", is_flag=True, help="Return once the job has started.")
     @click.option("--key", help="The same key again gives the same session and starts nothing.")
-    def job(context: Context, no_wait: bool, key: str | None) -> None:
+    def job(context: Context, no_wait: bool, key: str | None, picks: Path | None = None) -> None:
+        params: dict[str, Any] = {} if key is None else {"key": key}
+        if picks is not None:
+            params["picks"] = read_picks(picks)
         with connected(context, events=not no_wait) as client:
-            start(context, client, name, key, no_wait)
+            start(context, client, name, no_wait, params)
 
-    return job
+    return picks_option(job) if name in PICKING else job
 
 
-def start(context: Context, client: "Client", name: str, key: str | None, no_wait: bool) -> None:
+def start(
+    context: Context, client: "Client", name: str, no_wait: bool, params: Mapping[str, Any]
+) -> None:
     """Start a job, follow it unless told not to, and end with its outcome's code."""
     out = context.output
-    params = {} if key is None else {"key": key}
     begun = client.call(name, **params)
     session = str(begun["session"])
     if no_wait:

@@ -1,5 +1,6 @@
 """The way to the daemon: only `[server]` is read, so that stop works whatever else is wrong."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -10,6 +11,8 @@ from legato.cli.exits import Exit, Failure
 if TYPE_CHECKING:
     from legato.config.schema import ServerTable
     from legato.daemon.client import Client
+
+LEASE = "LEGATO_LEASE"  # the token of a lease that another command keeps
 
 
 @contextmanager
@@ -29,6 +32,9 @@ def connected(
     keys = client_keys(server, context.config or "the configuration")
     given = (asked, heard) if keys is None else (asked, heard, keys)
     client = context.services.connect(*given)
+    token = os.environ.get(LEASE)
+    if token:
+        client.under(token)
     try:
         yield client
     finally:

@@ -15,6 +15,7 @@ from legato.cli.exits import EPILOG
 from legato.cli.export import export
 from legato.cli.intrinsics import intrinsics
 from legato.cli.keygen import keygen
+from legato.cli.lease import lease
 from legato.cli.report import report
 from legato.cli.serve import serve
 from legato.cli.sessions import sessions
@@ -44,8 +45,8 @@ def main() -> None:
 
 
 for item in (
-    demo, serve, status, *jobs.COMMANDS, campaign, *act.COMMANDS, watch, web, sessions, campaigns,
-    report, compare, export, detect, solve, intrinsics, snapshot, emulate, keygen, check,
-    completion,
+    demo, serve, status, *jobs.COMMANDS, campaign, *act.COMMANDS, lease, watch, web, sessions,
+    campaigns, report, compare, export, detect, solve, intrinsics, snapshot, emulate, keygen,
+    check, completion,
 ):  # fmt: skip
     main.add_command(item)

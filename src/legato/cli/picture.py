@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from legato.cli.exits import Exit, Failure
 
 if TYPE_CHECKING:
@@ -17,6 +19,14 @@ if TYPE_CHECKING:
 
 LARGEST_FILE = 200_000_000  # bytes of a picture file; what it holds is limited at decoding
 LARGEST_PICKS = 100_000
+
+
+picks_option = click.option(
+    "--picks",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Marks picked by a person: JSON or TOML with P1 = [u, v], or CSV lines of name,u,v.",
+)
 
 
 def read_picture(path: Path, camera: "CameraTable | None" = None) -> "Image":
@@ -37,11 +47,11 @@ def read_picture(path: Path, camera: "CameraTable | None" = None) -> "Image":
     return image
 
 
-def read_picks(path: Path, names: Iterable[str]) -> dict[str, tuple[float, float]]:
+def read_picks(path: Path, names: Iterable[str] | None = None) -> dict[str, tuple[float, float]]:
     """Return marks that a person picked, {name: (u, v)} in px, of a JSON, TOML or CSV file.
 
     JSON and TOML: a table of `P1 = [u, v]`, or one named `marks`. CSV: lines of name,u,v. Raises
-    Failure for anything else and for names that the leg has not.
+    Failure for anything else, and for other names than `names`, where those are known here.
     """
     try:
         text = _bytes(path, LARGEST_PICKS).decode("utf-8")
@@ -49,7 +59,7 @@ def read_picks(path: Path, names: Iterable[str]) -> dict[str, tuple[float, float
     except (ValueError, TypeError, RecursionError) as error:
         hint = "give JSON or TOML with P1 = [u, v], or CSV lines of name,u,v"
         raise Failure(f"{path}: no picks: {error}", Exit.USAGE, hint) from error
-    known = set(names)
+    known = set(names if names is not None else picks)
     for name in picks:
         if name not in known:
             hint = f"the leg's marks are {', '.join(sorted(known))}"
@@ -112,9 +122,12 @@ def _place(name: str, u: Any, v: Any) -> tuple[float, float]:
 
 
 def _bytes(path: Path, most: int) -> bytes:
-    """Return a file's bytes; raises OSError, and Failure where there are too many."""
-    with path.open("rb") as stream:
-        data = stream.read(most + 1)
+    """Return a file's bytes; raises OSError, and Failure where it is not there or too large."""
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(most + 1)
+    except FileNotFoundError as error:
+        raise Failure(f"there is no file {path}", Exit.USAGE) from error
     if len(data) > most:
         raise Failure(f"{path} is larger than {most} bytes", Exit.USAGE)
     return data

@@ -1,7 +1,6 @@
 """`legato serve`: the daemon in the foreground."""
 
 import os
-from pathlib import Path
 
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit
@@ -15,18 +14,21 @@ def serve(context: Context) -> None:
     """
     # Before numpy is loaded: its threads would cost start and memory, and nothing here needs them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from legato.config.load import load
+    from legato.config.place import state_dir_in
     from legato.daemon.lock import AlreadyRunning, look
     from legato.daemon.log import make_log
 
-    loaded, log = load(context.config), make_log()
+    log = make_log()
+    place = state_dir_in(context.config) if context.config is not None else None
     try:
-        look(Path(loaded.config.records.state_dir))
+        if place is not None:
+            look(place)
     except AlreadyRunning as error:
         log.error("already_running", text=str(error), hint="stop it first")
         context.end(Exit.FAILED)
+    from legato.config.load import load
     from legato.daemon.serve import serve as run
 
-    code = run(loaded, log)
+    code = run(load(context.config), log)
     if code:
         context.end(Exit(code))

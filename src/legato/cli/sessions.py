@@ -10,6 +10,7 @@ from legato.cli.examples import write_examples
 from legato.cli.exits import EPILOG
 from legato.cli.records import replay, verify
 from legato.cli.store import opened_store, state_dir_option
+from legato.report.clock import day
 
 if TYPE_CHECKING:
     from legato.records.record import SessionRecord
@@ -60,9 +61,13 @@ def listed(context: Context, session: str | None, state_dir: Path | None, limit:
     found = store.sessions()[:limit]
     keys = ("id", "job", "started", "ended", "outcome", "reason", "cause", "simulated")
     out.document([{key: getattr(s, key) for key in keys} for s in found])
-    rows = [(s.id, s.job, s.outcome or "open", _kind(s.simulated), s.reason or "") for s in found]
+    rows = [
+        (s.id, day(s.started) or s.started, s.job, s.outcome or "open", _kind(s.simulated),
+         s.reason or "")
+        for s in found
+    ]  # fmt: skip
     if rows:
-        out.table(("session", "job", "outcome", "cell", "reason"), rows)
+        out.table(("session", "began", "job", "outcome", "cell", "reason"), rows)
     else:
         out.say(f"no sessions in {store.folder}")
 
@@ -76,7 +81,8 @@ def show(context: Context, record: "SessionRecord") -> None:
     head = {key: meta.get(key) for key in keys}
     places = {"path": str(record.path), "torn": record.torn, "events": len(record.events)}
     out.document({**head, **places, "states": states, "contacts": contacts})
-    rows = [(key, value) for key, value in head.items() if value is not None]
+    times = {key: day(head[key]) for key in ("started", "ended")}
+    rows = [(key, times.get(key) or value) for key, value in head.items() if value is not None]
     out.table(("", ""), [*rows, ("states", " ".join(states)), ("record", str(record.path))])
     if record.torn:
         out.say("the record is torn: what was written last is missing")

@@ -8,7 +8,7 @@ import click
 
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit, Failure
-from legato.cli.picture import read_picks, read_picture
+from legato.cli.picture import picks_option, read_picks, read_picture
 
 if TYPE_CHECKING:
     from legato.calibration.problem import CalibrationError
@@ -22,11 +22,7 @@ ENGINES = ("hybrid", "paper", "separable")
 @click.argument("image", type=click.Path(dir_okay=False, path_type=Path))
 @click.option("--engine", type=click.Choice(ENGINES), help="Default: calibration.engine.")
 @click.option("--marks", metavar="P1,P2,...", help="Use only these marks.")
-@click.option(
-    "--picks",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Marks picked by a person: JSON or TOML with P1 = [u, v], or CSV lines of name,u,v.",
-)
+@picks_option
 def solve(
     context: Context, image: Path, engine: str | None, marks: str | None, picks: Path | None
 ) -> None:

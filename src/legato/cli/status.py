@@ -22,12 +22,13 @@ def status(context: Context) -> None:
 def rows(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return a status as names and values for a person."""
     arm, camera = answer.get("arm") or {}, answer.get("camera") or {}
+    clock = " by the cell's clock" if answer.get("simulated") else ""
     found = [
         ("state", str(answer.get("state")) + (" (simulated)" if answer.get("simulated") else "")),
-        ("session", str(answer.get("session") or "-")),
+        ("session", _session(answer)),
         ("arm", _arm(arm)),
-        ("camera", _camera(camera)),
-        ("calibration", _calibration(answer.get("calibration"))),
+        ("camera", _camera(camera, clock)),
+        ("calibration", _calibration(answer.get("calibration"), clock)),
         ("up", f"{answer.get('uptime_s') or 0:.0f} s, legato {answer.get('version')}"),
     ]
     if answer.get("station") is not None:
@@ -38,6 +39,12 @@ def rows(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
         found.append(("fault", f"{fault.get('cause')}: {fault.get('text')}"))
         found.append(("what to do", str(fault.get("hint"))))
     return found
+
+
+def _session(answer: Mapping[str, Any]) -> str:
+    """Return the session that runs, or the one that the fault has ended."""
+    ended = (answer.get("fault") or {}).get("session")
+    return str(answer.get("session") or (f"{ended}, ended by the fault" if ended else "-"))
 
 
 def _campaign(campaign: Mapping[str, Any]) -> str:
@@ -59,15 +66,15 @@ def _arm(arm: Mapping[str, Any]) -> str:
     return f"at ({place}) mm, contact {'yes' if arm.get('contact') else 'no'}"
 
 
-def _camera(camera: Mapping[str, Any]) -> str:
+def _camera(camera: Mapping[str, Any], clock: str) -> str:
     if not camera.get("connected"):
         return "not connected"
     age = camera.get("age_s")
-    return "connected" + (f", last picture {age:.1f} s ago" if age is not None else "")
+    return "connected" + (f", last picture {age:.1f} s ago{clock}" if age is not None else "")
 
 
-def _calibration(calibration: Mapping[str, Any] | None) -> str:
+def _calibration(calibration: Mapping[str, Any] | None, clock: str) -> str:
     if not calibration:
         return "none"
     valid = "verified" if calibration.get("valid") else "not verified"
-    return f"{valid}, {calibration.get('age_s') or 0:.0f} s old"
+    return f"{valid}, {calibration.get('age_s') or 0:.0f} s old{clock}"

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from legato.cli.command import Context, command
-from legato.cli.events import line_of
 from legato.cli.line import connected
+from legato.report.lines import line_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -51,15 +51,18 @@ def watch(context: Context, lines: bool, every: bool, count: int | None) -> None
 
 
 def each_line(context: Context, client: "Client", every: bool, count: int | None) -> None:
-    """Print events as they come."""
+    """Print events as they come, for people with when they were heard and the cell's clock."""
     out, seen = context.output, 0
+    if not out.as_json:
+        out.note("heard at, the cell's clock in s, topic, what happened; the first may be older")
     while True:
         for topic, event in client.events(LISTEN_S):
             if topic in QUIET and not every:
                 continue
             out.line({"topic": topic, **event})
             if not out.as_json:
-                out.say(f"{event.get('t', 0):12.3f} {topic:<9} {line_of(topic, event)}")
+                told = f"{event.get('t', 0):12.3f} {topic:<9} {line_of(topic, event)}"
+                out.say(f"{time.strftime('%H:%M:%S')} {told}")
             seen += 1
             if seen == count:
                 return

@@ -1,6 +1,7 @@
 """Reads a TOML file and decodes it as a Struct; every refusal is a ConfigError."""
 
 import math
+import threading
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,6 +13,8 @@ from legato.config.expected import refusal
 
 T = TypeVar("T")
 
+# Two threads that are the first to use a type of msgspec's at once crash the process.
+_ALONE = threading.Lock()
 LARGEST_FILE = 1_000_000  # bytes; a configuration is a few thousand
 
 
@@ -40,7 +43,8 @@ def decode(data: Any, of: type[T], file: Path) -> T:
     """Return `data` as a Struct `of`, strictly. Raises ConfigError naming key and value."""
     refuse_not_finite(data, file)
     try:
-        return msgspec.convert(data, of, strict=True)
+        with _ALONE:
+            return msgspec.convert(data, of, strict=True)
     except msgspec.ValidationError as error:
         raise refusal(error, data, of, file) from error
 

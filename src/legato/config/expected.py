@@ -124,7 +124,7 @@ def describe(wanted: inspect.Type) -> str:
         case inspect.FloatType():
             return "a number" + _range(wanted)
         case inspect.StrType():
-            return "a text in quotes" + (", not an empty one" if wanted.pattern else "")
+            return "a text in quotes" + (" (not empty)" if wanted.pattern else "")
         case inspect.TupleType():
             return f"a list of {len(wanted.item_types)}, each {describe(wanted.item_types[0])}"
         case inspect.VarTupleType() | inspect.ListType():

@@ -16,6 +16,7 @@ from legato.config.decode import decode, read_toml
 from legato.config.endpoints import resolved
 from legato.config.errors import ConfigError
 from legato.config.intrinsics import IntrinsicsFile, read_intrinsics
+from legato.config.place import absolute
 from legato.config.schema import Config, ServerTable
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -96,9 +97,9 @@ def _absolute(config: Config, file: Path) -> Config:
     replace = msgspec.structs.replace
     server, camera = config.server, config.camera
     if camera.intrinsics is not None:
-        camera = replace(camera, intrinsics=_path(camera.intrinsics, folder))
+        camera = replace(camera, intrinsics=absolute(camera.intrinsics, folder))
     if isinstance(camera.source, str) and "://" not in camera.source:
-        camera = replace(camera, source=_path(camera.source, folder))
+        camera = replace(camera, source=absolute(camera.source, folder))
     server = replace(
         server,
         requests=resolved(server.requests, folder),
@@ -108,23 +109,17 @@ def _absolute(config: Config, file: Path) -> Config:
         server_public=_optional(server.server_public, folder),
     )
     if server.curve is not None:
-        secret, clients = _path(server.curve.secret, folder), _path(server.curve.clients, folder)
+        secret, clients = (
+            absolute(server.curve.secret, folder),
+            absolute(server.curve.clients, folder),
+        )
         server = replace(server, curve=replace(server.curve, secret=secret, clients=clients))
-    records = replace(config.records, state_dir=_path(config.records.state_dir, folder))
+    records = replace(config.records, state_dir=absolute(config.records.state_dir, folder))
     return replace(config, server=server, camera=camera, records=records)
 
 
 def _optional(name: str | None, folder: Path) -> str | None:
-    return None if name is None else _path(name, folder)
-
-
-def _path(name: str, folder: Path) -> str:
-    """Return a path as absolute text; `~` that names nobody stays as it stands."""
-    try:
-        path = Path(name).expanduser()
-    except RuntimeError:
-        path = Path(name)
-    return str(folder / path)
+    return None if name is None else absolute(name, folder)
 
 
 def _digest(data: dict[str, Any], intrinsics: IntrinsicsFile | None) -> str:

@@ -20,6 +20,7 @@ Seconds = Annotated[float, Meta(gt=0, le=60)]
 Place = Annotated[float, Meta(ge=-100_000, le=100_000)]
 Turn = Annotated[float, Meta(ge=-3600, le=3600)]
 Point = tuple[Place, Place, Place]
+Named = Annotated[str, Meta(pattern=r"\S")]
 Row = tuple[Place, Place, Place, Place]
 DegRange = tuple[Turn, Turn]
 
@@ -27,8 +28,8 @@ DegRange = tuple[Turn, Turn]
 class CurveTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The daemon's side of the encryption: its own secret, and the folder of those it lets in."""
 
-    secret: str
-    clients: str
+    secret: Named
+    clients: Named
 
 
 class ServerTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -62,7 +63,7 @@ class RobotTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The arm: which driver, its line, its measures and limits (manual's figures by default)."""
 
     driver: Literal["sim", "teachmover"] = "sim"
-    port: str = "/dev/ttyUSB0"
+    port: Named = "/dev/ttyUSB0"
     baud: Literal[110, 150, 300, 600, 1200, 2400, 4800, 9600] = 9600
     reply_margin_s: Seconds = 1.0
     switch_mask: Annotated[int, Meta(ge=1, le=255)] = 0x80
@@ -100,7 +101,7 @@ class CameraTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """The camera: which driver, its source, the picture's size, its intrinsics."""
 
     driver: Literal["sim", "opencv"] = "sim"
-    source: str | int = 0
+    source: Named | int = 0
     width: Annotated[int, Meta(ge=320, le=4096)] = 768
     height: Annotated[int, Meta(ge=240, le=4096)] = 576
     timeout_s: Seconds = 3.0
@@ -147,7 +148,7 @@ class LegTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class RecordsTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Where sessions are kept, how long, and how much room must be left."""
 
-    state_dir: Annotated[str, Meta(pattern=r"\S")] = "~/.local/state/legato"
+    state_dir: Named = "~/.local/state/legato"
     keep_days: Annotated[int, Meta(ge=1, le=36_500)] = 90
     keep_sessions: Annotated[int, Meta(ge=0, le=1_000_000)] = 20
     min_free_mb: Annotated[int, Meta(ge=0, le=10_000_000)] = 200

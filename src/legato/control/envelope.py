@@ -70,9 +70,10 @@ def _command(model: ArmModel, move: Move) -> list[str]:
 
 def _box(settings: CellSettings, tip: Array, margin: float) -> list[str]:
     space = settings.workspace
-    spare = f" mm, {margin:g} mm to spare" if margin else " mm"
+    spare = f" mm, {margin:g} mm within its sides" if margin else " mm"
     return [
-        f"fingertip {axis} {value:.1f} mm is outside the workspace {low:.0f} to {high:.0f}{spare}"
+        f"fingertip {axis} {value:.1f} mm is outside the workspace {low + margin:g} to "
+        f"{high - margin:g}{spare}"
         for axis, value, low, high in zip("xyz", tip, space.low, space.high, strict=True)
         if not low + margin <= value <= high - margin
     ]

@@ -31,7 +31,6 @@ REFUSED_IN_STATE: Final = "refused_in_state"
 BUSY: Final = "busy"
 IN_FAULT: Final = "in_fault"
 PRECONDITION: Final = "precondition"
-UNAVAILABLE: Final = "unavailable"
 NOT_AUTHORISED: Final = "not_authorised"
 
 

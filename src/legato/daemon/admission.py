@@ -3,13 +3,18 @@
 Each check raises the Failure that the client is told.
 """
 
+from typing import TYPE_CHECKING
+
 from legato.control.settings import CellSettings
 from legato.control.states import CALIBRATE, CAPTURE, MOVE_HOME, VERIFY, massage_state
+from legato.control.table import JOBS
 from legato.daemon.messages import View
-from legato.daemon.standing import Setting
 from legato.records.errors import RecordError
 from legato.records.store import Store
 from legato.wire.jsonrpc import Failure
+
+if TYPE_CHECKING:
+    from legato.daemon.standing import Setting
 
 CAMERA_JOBS = ("run", "capture", "verify")
 ARM_JOBS = ("run", "home", "massage", "reference")
@@ -43,11 +48,26 @@ def need_free_worker(busy: str | None) -> None:
         raise Failure("unavailable", f"the worker has not let go of {busy} yet", hint)
 
 
-def need_all(job: str, view: View, setting: Setting, store: Store) -> None:
+def need_all(job: str, view: View, setting: "Setting", store: Store) -> None:
     """Raise Failure where a job lacks devices, knowledge or room for its record."""
     need_devices(job, view)
     need_knowledge(job, view, setting.settings, setting.clock())
     need_room(store, setting.min_free_mb)
+
+
+def lacking(view: View, settings: CellSettings, now: float) -> dict[str, dict[str, str]]:
+    """Return the requests that idle admits and the cell cannot serve: reason and hint of each.
+
+    Room on the disk is not looked at. `now` is the cell's clock in s.
+    """
+    found = {}
+    for job in (*JOBS, "reference") if view.memory is not None else ():
+        try:
+            need_devices(job, view)
+            need_knowledge(job, view, settings, now)
+        except Failure as no:
+            found[job] = {"reason": no.reason, "hint": no.hint}
+    return found
 
 
 def need_devices(job: str, view: View) -> None:

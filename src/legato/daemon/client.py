@@ -18,6 +18,7 @@ from legato.control.table import ACTING, STOPS
 from legato.daemon.keys import Keys
 from legato.daemon.link import DaemonUnavailable, KeyRefused, Link, RpcError
 from legato.daemon.sequence import AT_PRESENT, Event, Sequence
+from legato.wire.jsonrpc import MAX_BYTES, too_long
 from legato.wire.requests import TOPICS
 
 __all__ = ["Client", "DaemonUnavailable", "KeyRefused", "RpcError"]
@@ -89,6 +90,10 @@ class Client:
         self._asked = {"duration_s": duration_s, "deadman": deadman}
         return self._lease_told()
 
+    def under(self, token: str) -> None:
+        """Act under a lease that somebody else has taken, renews and ends."""
+        self._lease, self._asked = token, {}
+
     def release(self) -> None:
         """End the lease before its time, if there is one."""
         token, self._lease = self._lease, None
@@ -139,10 +144,14 @@ class Client:
         waits = self._timeout_s + SLOW_S.get(method, 0.0)
         if method in ("wait", "stop", "estop"):
             waits += float(params.get("timeout_s", 60.0 if method == "wait" else 0.0))
+        body = msgspec.json.encode(request)
+        if len(body) > MAX_BYTES:
+            no = too_long(len(body))
+            raise RpcError(no.code, no.name, {"reason": no.reason, "hint": no.hint})
         try:
             caller = self._connected()
             caller.catch_up()
-            caller.socket.send(msgspec.json.encode(request))
+            caller.socket.send(body)
             reply = self._reply(caller, call_id, waits)
         except (DaemonUnavailable, KeyRefused):
             self._drop()
@@ -210,7 +219,7 @@ class Client:
             self._lease_told()
 
     def _renew_in(self) -> float:
-        if self._lease is None:
+        if self._lease is None or not self._asked:
             return float("inf")
         due = self._renewed_at + float(self._asked["duration_s"]) / RENEWALS
         return max(due - time.monotonic(), 0.0)

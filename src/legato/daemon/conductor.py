@@ -166,9 +166,9 @@ class Conductor:
         self._see_gate()
         standing = self.standing
         match message:
-            case DevicesKnown(view, versions):
-                standing.view, self._versions, self.devices_known = view, versions, True
-                standing.keep()
+            case DevicesKnown(view, versions, older):
+                self._versions, self.devices_known = versions, True
+                standing.known(view, older)
                 self.settled.append((DEVICES, {}))
             case Looked(view):
                 standing.look(view)

@@ -3,7 +3,7 @@
 import time
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from legato.daemon.desk import Desk
@@ -31,7 +31,7 @@ class Histogram:
 class Counts:
     """All that is counted. Each member has one thread that writes it."""
 
-    def __init__(self) -> None:
+    def __init__(self, stations: Iterable[float] = ()) -> None:
         self.sessions: dict[tuple[str, str], int] = defaultdict(int)
         self.faults: dict[str, int] = defaultdict(int)
         self.entered: dict[str, int] = defaultdict(int)
@@ -39,6 +39,8 @@ class Counts:
         self.late = Histogram(LATENCIES_S)
         self.effects: dict[str, Histogram] = defaultdict(lambda: Histogram(EFFECTS_S))
         self.heights: dict[str, Histogram] = defaultdict(lambda: Histogram(HEIGHTS_MM))
+        for station in stations:
+            self.heights[f"{station:g}"] = Histogram(HEIGHTS_MM)
 
     def heard(self, topic: str, data: Mapping[str, Any]) -> None:
         """Count what an event tells; the loop's thread calls this for each that is published."""

@@ -7,12 +7,15 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, assert_never
 
+from msgspec import Raw
+
 from legato.control.settings import CellSettings
 from legato.control.table import CAMPAIGN, JOBS, METHODS, READERS, admit, authorise
 from legato.daemon.asked import params_of, pose_of
 from legato.daemon.conductor import Conductor
 from legato.daemon.events import Events
 from legato.daemon.log import Log
+from legato.daemon.recent import Recent
 from legato.daemon.sessions import Session as KnownSession
 from legato.daemon.status import describe
 from legato.daemon.waiters import DEVICES, Ask, Waiter, Waiters, What
@@ -49,7 +52,7 @@ JOB_WAIT_S = 3.0
 STARTS = (*JOBS, CAMPAIGN)
 NEED_DEVICES = (*STARTS, "reference", "reset")
 
-Result = Mapping[str, Any]
+Result = Mapping[str, Any] | Raw
 Send = Callable[[list[bytes]], None]
 
 
@@ -66,7 +69,7 @@ class Desk:
         settings: CellSettings,
         send: Send,
         log: Log,
-        stops: Callable[[], Result | None] = lambda: None,
+        stops: Callable[[], Mapping[str, Any] | None] = lambda: None,
     ) -> None:
         self.junk = 0
         self._conductor = conductor
@@ -76,6 +79,8 @@ class Desk:
         self._log = log
         self._stops = stops
         self._waiters = Waiters()
+        self._acts = 0  # requests that may have changed something
+        self._status = Recent(self._status_told)
 
     def receive(
         self, frames: Sequence[bytes], now: float, who: Who = LOCAL, since: int | None = None
@@ -142,6 +147,7 @@ class Desk:
             if no is not None:
                 raise Failure(no.code, no.reason, no.hint)
         request = decode_params(call)
+        self._acts += call.method not in READERS
         if isinstance(request, Job) and request.key is not None:
             known = self._conductor.standing.sessions.with_key(request.key)
             if known is not None:
@@ -176,9 +182,7 @@ class Desk:
             case Ping():
                 return {"boot": self._events.boot, "state": conductor.state, "now": now}
             case Status():
-                lease = conductor.leases.told(now)
-                told = conductor.standing.status() | {"lease": lease, "stop": self._stops()}
-                return told | {"campaign": conductor.campaigns.told()}
+                return self._status.told(now, self._version())
             case Describe():
                 return describe(self._settings.stations)
             case Wait(session=session, timeout_s=timeout):
@@ -224,6 +228,16 @@ class Desk:
                 assert_never(request)
         current = conductor.standing.sessions.current
         return {"session": current.id if current else None, "state": conductor.state}
+
+    def _status_told(self, now: float) -> Mapping[str, Any]:
+        conductor = self._conductor
+        told = conductor.standing.status() | {"lease": conductor.leases.told(now)}
+        return told | {"stop": self._stops(), "campaign": conductor.campaigns.told()}
+
+    def _version(self) -> tuple[int, ...]:
+        """Return what differs once something was asked for, seen or published."""
+        conductor = self._conductor
+        return self._events.seq, conductor.standing.views, conductor.gate.number, self._acts
 
     def _later(self, ask: Ask, what: What, due: float) -> Result | None:
         """Let a request wait."""

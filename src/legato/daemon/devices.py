@@ -32,6 +32,7 @@ class Devices:
         self.memory = memory
         self.solved: tuple[Frame, float] | None = None
         self.calibrated_at: float | None = None
+        self.calibrated_in: str | None = None
         self._settings = settings
         self._arm_connected = False
         self._camera_connected = False
@@ -138,6 +139,7 @@ class Devices:
             camera_connected=self._camera_connected,
             picture_at=self._picture_at,
             calibrated_at=self.calibrated_at,
+            calibrated_in=self.calibrated_in,
             memory=replace(self.memory),
         )
 

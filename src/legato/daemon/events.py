@@ -27,7 +27,7 @@ class Events:
         self.boot = boot
         self._clock = clock
         self._publish = publish
-        self._seq = 0
+        self.seq = 0  # of the latest event
         self._latest: dict[str, tuple[int, bytes]] = {}
         self._ring: deque[tuple[int, bytes]] = deque(maxlen=kept)
 
@@ -35,17 +35,17 @@ class Events:
         """Publish an event with the next number."""
         if topic not in TOPICS:
             raise ValueError(f"there is no topic {topic!r}")
-        self._seq += 1
+        self.seq += 1
         head: dict[str, Any] = {
             "topic": topic,
             "boot": self.boot,
-            "seq": self._seq,
+            "seq": self.seq,
             "t": self._clock(),
         }
         head["session"] = session
         body = encode(head | dict(data) | head)
-        self._latest[topic] = (self._seq, body)
-        self._ring.append((self._seq, body))
+        self._latest[topic] = (self.seq, body)
+        self._ring.append((self.seq, body))
         self._publish(topic, body)
 
     def latest(self, prefix: str) -> list[tuple[str, bytes]]:
@@ -65,12 +65,12 @@ class Events:
         """
         same = boot == self.boot
         after = seq if same else 0
-        oldest = self._ring[0][0] if self._ring else self._seq + 1
+        oldest = self._ring[0][0] if self._ring else self.seq + 1
         first = max(after - oldest + 1, 0)
         found = [msgspec.Raw(body) for _, body in islice(self._ring, first, first + limit)]
         return {
             "boot": self.boot,
-            "seq": self._seq,
+            "seq": self.seq,
             "complete": same and after + 1 >= oldest,
             "more": first + len(found) < len(self._ring),
             "events": found,

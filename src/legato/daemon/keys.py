@@ -22,7 +22,6 @@ from legato.config.toml import dumps
 from legato.control.table import ROLES
 from legato.daemon.who import Who
 
-SERVER: Final = "server"
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", re.ASCII)
 HINT: Final = "make keys with `legato keygen`"
 

@@ -1,15 +1,18 @@
 """The daemon's log, and the only home of structlog: JSON lines for the journal, colours for people.
 
 Everything goes to stderr. Work that changes something is told at info, plain looking at debug.
-A line that stderr does not take, on a full disk or with nobody reading, is lost and no more.
+Nobody waits for stderr: a line that it does not take, on a full disk or with nobody reading, is
+lost and no more; the next that it takes is preceded by how many were.
 """
 
 import sys
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cached_property
-from typing import Any, Protocol, TextIO
+from typing import Any, Protocol, TextIO, cast
 
 from legato.daemon.messages import Message, StopAnswered, StopLineBug, TurnedAway
+from legato.daemon.outlet import Outlet
 
 
 class Log(Protocol):
@@ -42,6 +45,7 @@ class _Late:
     def __init__(self, out: TextIO, level: str) -> None:
         self._out = out
         self._level = level
+        self._outlet = _outlet(out)
 
     @cached_property
     def _log(self) -> Log:
@@ -56,7 +60,7 @@ class _Late:
         else:
             shared.append(structlog.processors.JSONRenderer())
         log: Log = structlog.wrap_logger(
-            structlog.PrintLogger(self._out),
+            structlog.WriteLogger(cast(TextIO, self._outlet) if self._outlet else self._out),
             processors=shared,
             wrapper_class=structlog.make_filtering_bound_logger(self._level),
         )
@@ -64,20 +68,31 @@ class _Late:
 
     def debug(self, event: str, **fields: Any) -> None:
         if self._level == "debug":
-            with suppress(*LOST):
-                self._log.debug(event, **fields)
+            self._tell("debug", event, fields)
 
     def info(self, event: str, **fields: Any) -> None:
-        with suppress(*LOST):
-            self._log.info(event, **fields)
+        self._tell("info", event, fields)
 
     def warning(self, event: str, **fields: Any) -> None:
-        with suppress(*LOST):
-            self._log.warning(event, **fields)
+        self._tell("warning", event, fields)
 
     def error(self, event: str, **fields: Any) -> None:
+        self._tell("error", event, fields)
+
+    def _tell(self, level: str, event: str, fields: Mapping[str, Any]) -> None:
         with suppress(*LOST):
-            self._log.error(event, **fields)
+            lost = self._outlet.take_lost() if self._outlet else 0
+            if lost:
+                self._log.warning("lines_lost", count=lost)
+            getattr(self._log, level)(event, **fields)
+
+
+def _outlet(stream: TextIO) -> Outlet | None:
+    """Return the way to a stream that may keep its writer waiting, None for one in memory."""
+    try:
+        return Outlet(stream.fileno())
+    except LOST:
+        return None
 
 
 def note(log: Log, message: Message) -> None:

@@ -1,6 +1,6 @@
 """What worker, stop line and doorman tell the loop. Plain data; events in the past tense."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -8,14 +8,15 @@ from legato.hal.faults import Cause
 
 if TYPE_CHECKING:
     from legato.control.memory import Memory
+    from legato.records.store import Summary
 
 
 @dataclass(frozen=True)
 class View:
     """What is known of arm, camera and leg: a copy that nobody changes any more.
 
-    `arm` is ready for status; `picture_at` and `calibrated_at` are the cell's clock in s. `memory`
-    is None until the devices are known.
+    `arm` is ready for status; `picture_at` and `calibrated_at` are the cell's clock in s,
+    `calibrated_in` is the session that found the leg. `memory` is None until the devices are known.
     """
 
     arm: Mapping[str, Any] = field(
@@ -31,6 +32,7 @@ class View:
     camera_connected: bool = False
     picture_at: float | None = None
     calibrated_at: float | None = None
+    calibrated_in: str | None = None
     memory: "Memory | None" = None
 
 
@@ -46,10 +48,11 @@ class FaultReport:
 
 @dataclass(frozen=True)
 class DevicesKnown:
-    """Arm and camera are open, or known to be missing."""
+    """Arm and camera are open, or known to be missing; `older` sessions were read meanwhile."""
 
     view: View
     versions: Mapping[str, str]
+    older: "Sequence[Summary]" = ()
 
 
 @dataclass(frozen=True)

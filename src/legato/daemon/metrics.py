@@ -8,10 +8,14 @@ import platform
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from legato import __version__
+from legato.control.table import JOBS
 from legato.daemon.counts import Counts, Histogram
+from legato.hal.faults import Cause
+from legato.wire.requests import OUTCOMES
 
 if TYPE_CHECKING:
     from prometheus_client.core import Metric
@@ -118,17 +122,19 @@ def _gauges(now: Now) -> "Iterator[Metric]":
 def _counters(counts: Counts, now: Now) -> "Iterator[Metric]":
     from prometheus_client.core import CounterMetricFamily as Counter
 
+    # Each count stands there from the start as 0: Prometheus does not see the first of a series
+    # that begins with 1, and a night's only fault would be none.
     sessions = Counter("legato_sessions", "Sessions that have ended", labels=["job", "outcome"])
-    for labels, count in list(counts.sessions.items()):
-        sessions.add_metric(labels, count)
+    for labels in product(JOBS, OUTCOMES):
+        sessions.add_metric(labels, counts.sessions.get(labels, 0))
     yield sessions
-    for name, text, label, found in (
-        ("faults", "Faults that were latched", "cause", counts.faults),
-        ("states_entered", "States that were entered", "state", counts.entered),
+    for name, text, label, found, values in (
+        ("faults", "Faults that were latched", "cause", counts.faults, tuple(map(str, Cause))),
+        ("states_entered", "States that were entered", "state", counts.entered, now.states),
     ):
         counter = Counter(f"legato_{name}", text, labels=[label])
-        for value, count in list(found.items()):
-            counter.add_metric([value], count)
+        for value in values:
+            counter.add_metric([value], found.get(value, 0))
         yield counter
     junk = Counter("legato_junk_messages", "Messages that were none")
     junk.add_metric([], now.junk)

@@ -1,16 +1,19 @@
 """What the last daemon has left: its fault, where the arm stood, sessions without an end.
 
 A session that was running when a daemon died is closed as interrupted, and this one starts in
-fault: a person must look before anything moves.
+fault: a person must look before anything moves. However many sessions there were, only the latest
+are read before the first client is answered.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
+from legato.daemon import reports
 from legato.daemon.campaign_files import CampaignFiles, close_interrupted
 from legato.daemon.log import Log
+from legato.daemon.sessions import KEPT
 from legato.geometry.motion import Steps
 from legato.hal.faults import Cause
 from legato.records.errors import RecordError
@@ -18,6 +21,8 @@ from legato.records.store import Store, Summary
 
 if TYPE_CHECKING:
     from legato.config.schema import RobotTable
+
+LATEST: Final = 200  # as many as a client may list
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,7 @@ def read_past(store: Store, log: Log, *, arm: str | None) -> Past:
     anew with each process, and nothing of its arm outlives it.
     """
     state = _state(store, log)
-    summaries = store.sessions()
+    summaries = store.sessions(LATEST)
     open_ones = [s for s in summaries if s.outcome is None]
     fault = _fault(state.get("fault"))
     if open_ones:
@@ -54,7 +59,16 @@ def read_past(store: Store, log: Log, *, arm: str | None) -> Past:
         log.warning("interrupted", session=summary.id, job=summary.job)
     close_interrupted(CampaignFiles(store.state_dir), log)
     last = _arms_place(state) if arm is not None and arm == state.get("arm") else (None, None)
-    return Past(fault, store.sessions() if open_ones else summaries, last, arm)
+    return Past(fault, store.sessions(LATEST) if open_ones else summaries, last, arm)
+
+
+def read_older(store: Store, log: Log) -> Sequence[Summary]:
+    """Return the sessions before those of `read_past`, as many as are remembered."""
+    try:
+        return store.sessions(KEPT)[LATEST:]
+    except RecordError as error:
+        log.error("sessions_not_read", text=error.text, hint=error.hint)
+        return ()
 
 
 def _arms_place(state: Mapping[str, Any]) -> tuple[Steps | None, Steps | None]:
@@ -78,10 +92,11 @@ def _state(store: Store, log: Log) -> Mapping[str, Any]:
 
 
 def _interrupted(summary: Summary) -> dict[str, Any]:
+    report = reports.interrupted(summary.id, summary.job)
     return {
-        "cause": str(Cause.INTERRUPTED),
-        "text": f"the daemon ended while session {summary.id} ({summary.job}) was running",
-        "hint": "see that the arm is clear of the leg, then send reset",
+        "cause": str(report.cause),
+        "text": report.text,
+        "hint": report.hint,
         "since": datetime.now(UTC).isoformat(),
         "session": summary.id,
     }

@@ -5,6 +5,7 @@ Every effect raises what it meets; the procedure is told, and the worker makes i
 
 import time
 from collections.abc import Callable, Generator
+from dataclasses import replace
 from typing import Any, assert_never
 
 import numpy as np
@@ -82,7 +83,8 @@ class Performer:
         wall: Callable[[], float] = time.monotonic,
     ) -> None:
         self._devices = devices
-        self._settings = settings
+        # A search that lasts long ends at a stop too.
+        self._settings = replace(settings, engine=replace(settings.engine, heed=orders.look))
         self._writer = writer
         self._orders = orders
         self._post = post
@@ -151,12 +153,15 @@ class Performer:
         return find_marks_in(find.frame.image, self._settings, seed=seed, picks=find.picks)
 
     def _solve(self, solve: Solve) -> Calibration:
+        # Who asks meanwhile is told that the earlier calibration counts no more.
+        self._tell(at_once=True)
         began, frame, seed = self._wall(), solve.frame, self._settings.calibration.seed
         solved = perceive(
             frame.image, self._settings, seed=seed, picks=solve.picks, now_s=time.time()
         )
         self._devices.solved = frame, self._wall() - began
         self._devices.calibrated_at = self._devices.cell.clock.monotonic()
+        self._devices.calibrated_in = self._writer.id
         self._note_residuals(solved)
         return solved
 

@@ -18,6 +18,14 @@ def deadline(state: str, lasted_s: float) -> FaultReport:
     return FaultReport(Cause.DEADLINE, text, hint)
 
 
+def interrupted(session: str, job: str) -> FaultReport:
+    """Return the fault of a session that a daemon did not live to end."""
+    text = f"the daemon ended while session {session} ({job}) was running"
+    return FaultReport(
+        Cause.INTERRUPTED, text, "see that the arm is clear of the leg, then send reset"
+    )
+
+
 def disk(error: RecordError) -> FaultReport:
     """Return the fault of a disk that did not take a record."""
     return FaultReport(Cause.DISK, error.text, error.hint)

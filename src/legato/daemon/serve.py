@@ -26,7 +26,7 @@ from legato.daemon.log import Log, make_log
 from legato.daemon.loop import Loop
 from legato.daemon.mailbox import Mailbox
 from legato.daemon.orders import Orders
-from legato.daemon.past import Past, arm_name, read_past
+from legato.daemon.past import Past, arm_name, read_older, read_past
 from legato.daemon.sessions import Sessions
 from legato.daemon.sockets import Sockets
 from legato.daemon.standing import Setting, Standing
@@ -114,6 +114,7 @@ def _serve(loaded: "Loaded", store: Store, log: Log, procedures: "Procedures | N
             last=past.last,
             procedures=procedures,
             tidy=_tidy(config.records, store, log),
+            recall=partial(read_older, store, log),
             pulse=watching.pulse,
             timed=watching.counts.timed,
         )

@@ -4,6 +4,7 @@ A session's record is written here by the loop; nothing accepted is ever without
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
@@ -53,8 +54,18 @@ class Sessions:
         self._wall = wall
         self._known: dict[str, Session] = {}
         self._unsealed: list[Session] = []
-        for summary in sorted(past, key=lambda s: (s.started, s.id))[-KEPT:]:
-            self._known[summary.id] = _from(summary)
+        self.learn(past)
+
+    def learn(self, older: Iterable[Summary]) -> None:
+        """Take in sessions that are older than those that are known."""
+        found = sorted(older, key=lambda s: (s.started, s.id))
+        known = {summary.id: _from(summary) for summary in found} | self._known
+        self._known = dict(list(known.items())[-KEPT:])
+
+    def close(self, session: str) -> None:
+        """Give a session of an earlier daemon its outcome; where the disk refuses the next will."""
+        with suppress(RecordError):
+            self._store.close_interrupted(session)
 
     def now(self) -> str:
         """Return the time of day as ISO text."""

@@ -10,11 +10,14 @@ import zmq
 
 from legato.daemon.doorman import Doorman
 from legato.daemon.who import LOCAL, Who
-from legato.wire.jsonrpc import MAX_BYTES
+from legato.wire.jsonrpc import MAX_BYTES as LONGEST_REQUEST
 from legato.wire.requests import TOPICS
 
 HWM: Final = 1000
 HANDSHAKE_MS: Final = 5000  # half a handshake holds a connection no longer
+# A request that is too long is answered up to here; of what is longer still nothing is taken in,
+# and ZeroMQ ends the connection.
+MAX_BYTES: Final = 4 * LONGEST_REQUEST
 # A subscription names a topic; libzmq keeps 40 bytes for each of its letters, whatever they are.
 WISH_BYTES: Final = 1024
 STOP_THREAD: Final = 2  # of ZeroMQ's two I/O threads, as a bit mask: the stop line has one alone

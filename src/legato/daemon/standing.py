@@ -4,19 +4,24 @@ Every change is recorded and published here, and nowhere else. A fault is latche
 text and time stay until `clear`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from legato.control.settings import CellSettings
-from legato.control.states import FAULT, IDLE, CellMachine, deadline
+from legato.control.states import FAULT, IDLE, STOPPING, CellMachine, deadline
+from legato.daemon import reports
+from legato.daemon.admission import lacking
 from legato.daemon.journal import Journal
 from legato.daemon.log import Log
 from legato.daemon.messages import FaultReport, View
 from legato.daemon.sessions import Session, Sessions
 from legato.daemon.status import status_told
 from legato.hal.faults import Cause
+
+if TYPE_CHECKING:
+    from legato.records.store import Summary
 
 HEARTBEAT_S = 1.0
 
@@ -47,7 +52,7 @@ class Standing:
     ) -> None:
         self.sessions = sessions
         self.fault = dict(fault) if fault is not None else None
-        self.view = View()
+        self._view, self.views = View(), 0
         self.now = now
         self.began = now
         self._setting = setting
@@ -55,7 +60,9 @@ class Standing:
         self._log = log
         self._machine = CellMachine(setting.settings.stations, FAULT if fault else IDLE)
         self._entered(now)
+        self._stopped_by: str | None = None
         self.beat_at = now
+        self._lacked: tuple[View, dict[str, dict[str, str]]] | None = None
         cause = self.fault["cause"] if self.fault else "start"
         journal.tell("state", {"state": self.state, "previous": None, "cause": cause})
         if self.fault:
@@ -65,6 +72,16 @@ class Standing:
     def state(self) -> str:
         """The machine's state."""
         return self._machine.state
+
+    @property
+    def view(self) -> View:
+        """What is known of the devices; `views` counts how often that was told anew."""
+        return self._view
+
+    @view.setter
+    def view(self, view: View) -> None:
+        self._view = view
+        self.views += 1
 
     @property
     def running(self) -> bool:
@@ -94,9 +111,19 @@ class Standing:
             self.state,
             self.sessions.current,
             self.fault,
+            self._lacks(),
             clock=self._setting.clock(),
         )
         return told | {"boot": self._setting.boot, "uptime_s": self.uptime_s}
+
+    def _lacks(self) -> dict[str, dict[str, str]]:
+        """Return what an idle cell lacks; it changes with the view, which is new every second."""
+        if self.state != IDLE:
+            return {}
+        if self._lacked is None or self._lacked[0] is not self.view:
+            setting = self._setting
+            self._lacked = self.view, lacking(self.view, setting.settings, setting.clock())
+        return self._lacked[1]
 
     def is_current(self, session: str) -> bool:
         """Say whether a session is the one that runs."""
@@ -108,6 +135,8 @@ class Standing:
         if not self._machine.enter(state):
             return
         self._entered(self.now)
+        if state == STOPPING:
+            self._stopped_by = by
         change = {"state": state, "previous": previous, "cause": cause}
         change |= {"by": by} if by is not None else {}
         self._log.info("state", **change)
@@ -130,7 +159,7 @@ class Standing:
 
         Of `params`, `campaign` is not the request's: it names the campaign that has begun it.
         """
-        params = dict(params or {})
+        params, self._stopped_by = dict(params or {}), None
         part = {"campaign": params.pop("campaign")} if "campaign" in params else {}
         meta = dict(self._setting.meta) | {
             "boot": self._setting.boot,
@@ -179,6 +208,8 @@ class Standing:
         """Give the running session its outcome and return its id."""
         current = self.sessions.current
         assert current is not None, "only a running session ends"
+        if outcome == "stopped" and reason is None and self._stopped_by is not None:
+            reason = f"asked for by {self._stopped_by}"
         told = _told(current) | {"outcome": outcome, "reason": reason}
         self._journal.tell("session", told, durable=True)
         session = self.sessions.end(outcome, reason, cause)
@@ -189,6 +220,16 @@ class Standing:
         """Give the running session the fault as its outcome and return its id."""
         assert self.fault is not None, "state fault always has its fault"
         return self.end("fault", self.fault["text"], Cause(self.fault["cause"]))
+
+    def known(self, view: View, older: "Sequence[Summary]" = ()) -> None:
+        """Take in the devices, and older sessions; one that never got an end is a fault."""
+        self.view = view
+        for summary in older:
+            if summary.outcome is None:
+                self.fail(reports.interrupted(summary.id, summary.job))
+                self.sessions.close(summary.id)
+        self.sessions.learn(s for s in older if s.outcome is not None)
+        self.keep()
 
     def look(self, view: View) -> None:
         """Take in what the idle worker has seen."""

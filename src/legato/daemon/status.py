@@ -5,6 +5,7 @@ from functools import lru_cache
 from typing import Any
 
 from legato import __version__
+from legato.control.band import band
 from legato.control.settings import CellSettings
 from legato.control.states import deadline, massage_state, rows, states
 from legato.control.table import ROLES, describe_table
@@ -41,10 +42,14 @@ def status_told(
     state: str,
     session: Session | None,
     fault: Mapping[str, Any] | None,
+    lacking: Mapping[str, Any],
     *,
     clock: float,
 ) -> dict[str, Any]:
-    """Return what `status` answers, but for boot and uptime; `clock` is the cell's, in s."""
+    """Return what `status` answers, but for boot and uptime; `clock` is the cell's, in s.
+
+    `lacking` is what an idle cell refuses all the same, by admission.lacking.
+    """
     return {
         "api": API,
         "version": __version__,
@@ -59,6 +64,7 @@ def status_told(
         "camera": camera_told(view, clock),
         "calibration": calibration_told(view, settings, clock),
         "fault": fault,
+        "lacking": lacking,
     }
 
 
@@ -71,12 +77,23 @@ def calibration_told(view: View, settings: CellSettings, now: float) -> dict[str
     age = now - since if since is not None else None
     fresh = age is not None and age <= settings.calibration.fresh_s
     solution = memory.calibration.solution
+    window, sigmas = settings.massage.contact_window_mm, tuple(solution.sigma_stations.tolist())
     return {
         "valid": memory.verified_at is not None and fresh,
         "age_s": age,
         "rms_px": solution.rms_px,
         "sigma_mm": float(max(solution.sigma_stations)),
+        "session": view.calibrated_in,
+        "stations": stations_told(settings.stations, sigmas, window),
     }
+
+
+@lru_cache(maxsize=4)
+def stations_told(
+    stations: tuple[float, ...], sigmas: tuple[float, ...], window: float
+) -> list[dict[str, Any]]:
+    """Return each station's band; nobody changes what is returned."""
+    return [band(s, e, window).told() for s, e in zip(stations, sigmas, strict=True)]
 
 
 def camera_told(view: View, now: float) -> dict[str, Any]:

@@ -32,7 +32,7 @@ class Watching:
         self, config: "Config", store: Store, log: Log, environment: Mapping[str, str] = os.environ
     ) -> None:
         self.pulse = Pulse(allowed(config))
-        self.counts = Counts()
+        self.counts = Counts(config.leg.stations_mm)
         listen = config.metrics.listen
         self._listen = listen_address(listen) if isinstance(listen, str) else None
         self.desk: type[Desk] = CountedDesk if self._listen else Desk

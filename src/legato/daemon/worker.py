@@ -10,7 +10,7 @@ import platform
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from legato.control.memory import Memory
     from legato.daemon.devices import Devices
     from legato.daemon.perform import Performer
+    from legato.records.store import Summary
 
 LOOK_S = 1.0  # between two looks at the idle arm
 PICKING = ("run", "calibrate")  # jobs that find the leg anew
@@ -51,8 +52,9 @@ Procedures = Callable[[str, CellSettings, "Memory", float], Generator[Effect, An
 class Worker:
     """One thread over one cell.
 
-    `last` is the reference and the registers recorded before; `tidy` removes old records, `pulse`
-    hears that the worker lives, `timed` how long each effect took.
+    `last` is the reference and the registers recorded before; `tidy` removes old records, `recall`
+    reads what the loop need not know before; `pulse` hears that the worker lives, `timed` how long
+    each effect took.
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class Worker:
         last: tuple[Steps | None, Steps | None] = (None, None),
         procedures: Procedures | None = None,
         tidy: Callable[[], object] = lambda: None,
+        recall: "Callable[[], Sequence[Summary]]" = tuple,
         look_s: float = LOOK_S,
         pulse: Pulse | None = None,
         timed: Callable[[str, float], None] = lambda _, __: None,
@@ -78,6 +81,7 @@ class Worker:
         self._last = last
         self._procedures = procedures
         self._tidy = tidy
+        self._recall = recall
         self._look_s = look_s
         self._modules = 0
         self._pulse = pulse if pulse is not None else Pulse()
@@ -114,7 +118,7 @@ class Worker:
             for problem in devices.open():
                 self._log.warning("missing", cause=problem.cause, text=problem.text)
             self._tidy_up()
-            self._post(DevicesKnown(devices.view(), _versions()))
+            self._post(DevicesKnown(devices.view(), _versions(), self._recall()))
             self._let_be()
             while self._serve(devices):
                 pass

@@ -1,48 +1,69 @@
-"""When what was recorded happened, on one time line: ns since 1970.
+"""When what was recorded happened by the wall's clock: ns since 1970.
 
-The cell's clock counts; the wall's time of the first event says where it begins. So a simulated
-session plays at the pace of the cell and not at that of the computer.
+Each event tells both clocks; between two events the wall's time is found from the cell's. Before
+the first and after the last the cell's clock counts, at the pace that the record says it had.
 """
 
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
+import numpy as np
+
+from legato.geometry.transforms import Array
 from legato.records.record import SessionRecord
+from legato.report.clock import moment, pace
 
 NANO = 1_000_000_000
 
 
 @dataclass(frozen=True)
 class TimeLine:
-    """`zero_ns` is when the cell's clock stood at `zero_s`."""
+    """Moments that both clocks are known of: the cell's `seconds` (N,), rising, N >= 1.
+
+    `apart_ns` (N,) is the wall's time of each since `zero_ns`; `pace` the cell's s in one of the
+    wall's.
+    """
 
     zero_ns: int
-    zero_s: float
+    seconds: Array
+    apart_ns: Array
+    pace: float = 1.0
+
+    @property
+    def zero_s(self) -> float:
+        """What the cell's clock showed at `zero_ns`."""
+        return float(self.seconds[0])
 
     def at(self, seconds: float) -> int:
-        """Return when the cell's clock stood at `seconds`."""
-        return max(self.zero_ns + round((float(seconds) - self.zero_s) * NANO), 0)
+        """Return the wall's time at which the cell's clock stood at `seconds`."""
+        inside = float(np.clip(seconds, self.seconds[0], self.seconds[-1]))
+        apart = float(np.interp(inside, self.seconds, self.apart_ns))
+        apart += (float(seconds) - inside) / self.pace * NANO
+        return max(self.zero_ns + round(apart), 0)
 
 
 def time_line(record: SessionRecord) -> TimeLine:
     """Return the time line of a session; without an event it begins when it was asked for."""
-    if record.events:
-        first = record.events[0]
-        return TimeLine(nanoseconds(first.get("wall")), float(first["t"]))
-    moves = record.trajectory["t"]
-    return TimeLine(nanoseconds(record.meta.get("started")), float(moves[0]) if moves.size else 0.0)
+    rows = [(float(e["t"]), nanoseconds(e.get("wall"))) for e in record.events]
+    known = {seconds: when for seconds, when in reversed(rows) if when}  # of equal t the first
+    if not known:
+        moves = record.trajectory["t"]
+        first = rows[0][0] if rows else float(moves[0]) if moves.size else 0.0
+        known = {first: nanoseconds(record.meta.get("started"))}
+    seconds = sorted(known)
+    zero = known[seconds[0]]
+    apart = np.array([known[s] - zero for s in seconds], dtype=float)
+    return TimeLine(zero, np.array(seconds), apart, pace(record))
 
 
 def nanoseconds(wall: Any) -> int:
     """Return an ISO time as ns since 1970, 0 where it is none."""
-    try:
-        moment = datetime.fromisoformat(str(wall))
-    except ValueError:
+    found = moment(wall)
+    if found is None:
         return 0
-    moment = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
-    apart = moment - datetime(1970, 1, 1, tzinfo=UTC)
-    return (apart.days * 86_400 + apart.seconds) * NANO + apart.microseconds * 1000
+    apart = found - datetime(1970, 1, 1, tzinfo=UTC)
+    return apart // timedelta(microseconds=1) * 1000
 
 
 def left(record: SessionRecord, state: str) -> float:

@@ -1,7 +1,8 @@
 """A session as one MCAP file that plays in Foxglove and Rerun.
 
 Pictures, frames, scene, joints and log in Foxglove's schemas (protobuf); beside them every event
-of the record, whole, as JSON under /record/KIND. Messages are written in the order of time.
+of the record, whole, as JSON under /record/KIND. Messages are written in the order of time, which
+is the wall's; the cell's clock, which a simulated cell may run faster, is under /cell/clock.
 """
 
 import json
@@ -39,6 +40,17 @@ EVENT_SCHEMA = {
     },
     "required": ["seq", "wall", "t", "kind", "data"],
 }
+CLOCK_SCHEMA = {
+    "title": "legato.Clock",
+    "description": "The cell's clock at the time of the message.",
+    "type": "object",
+    "properties": {
+        "cell_s": {"type": "number", "description": "the cell's clock, s"},
+        "pace": {"type": "number", "description": "the cell's s in one of the wall's"},
+    },
+    "required": ["cell_s", "pace"],
+}
+CLOCK = "/cell/clock"
 DOCUMENTS = ("session.json", "calibration.json", "truth.json")
 
 Timed = tuple[int, str, Any]  # when in ns, topic, a protobuf message or a JSON object
@@ -57,18 +69,20 @@ class Channels:
         """Write one message at a moment."""
         plain = isinstance(message, dict)
         if topic not in self.known:
-            schema = self._json() if plain else self._protobuf(type(message))
+            schema = self._json(topic) if plain else self._protobuf(type(message))
             encoding = "json" if plain else "protobuf"
             self.known[topic] = self.writer.register_channel(topic, encoding, schema)
         data = json.dumps(message).encode() if plain else message.SerializeToString()
         self.counts[topic] += 1
         self.writer.add_message(self.known[topic], moment_ns, data, moment_ns, self.counts[topic])
 
-    def _json(self) -> int:
-        if "json" not in self.schemas:
-            data = json.dumps(EVENT_SCHEMA).encode()
-            self.schemas["json"] = self.writer.register_schema("legato.Event", "jsonschema", data)
-        return self.schemas["json"]
+    def _json(self, topic: str) -> int:
+        schema = CLOCK_SCHEMA if topic == CLOCK else EVENT_SCHEMA
+        name = str(schema["title"])
+        if name not in self.schemas:
+            data = json.dumps(schema).encode()
+            self.schemas[name] = self.writer.register_schema(name, "jsonschema", data)
+        return self.schemas[name]
 
     def _protobuf(self, kind: Any) -> int:
         from mcap_protobuf.schema import register_schema
@@ -149,6 +163,7 @@ def motion(record: SessionRecord, line: TimeLine, model: ArmModel) -> Iterator[T
     turns = chain_angles(angles)
     for t, own, turn in zip(path["t"], angles, turns, strict=True):
         moment_ns = line.at(t)
+        yield moment_ns, CLOCK, {"cell_s": float(t), "pace": line.pace}
         yield moment_ns, "/arm/frames", messages.arm_frames(moment_ns, joints, turn, model.hand)
         yield moment_ns, "/joint_states", messages.joint_states(moment_ns, joints, turn)
         yield moment_ns, "/fingertip", messages.fingertip(moment_ns, tip_frame(model, own))

@@ -12,6 +12,7 @@ import numpy as np
 from legato.export.chain import ROOT, TIP, Joint
 from legato.geometry.projection import Intrinsics
 from legato.geometry.transforms import Array
+from legato.report.lines import line_of
 
 if TYPE_CHECKING:
     from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
@@ -133,5 +134,4 @@ def log(moment_ns: int, event: Mapping[str, Any]) -> "Log":
     data = data if isinstance(data, Mapping) else {}
     bad = kind == "session" and data.get("outcome") not in (None, "done", "stopped")
     level = Log.ERROR if kind == "fault" else Log.WARNING if bad else Log.INFO
-    said = ", ".join(f"{name} {value}" for name, value in data.items() if value is not None)
-    return Log(timestamp=stamp(moment_ns), level=level, name=kind, message=said)
+    return Log(timestamp=stamp(moment_ns), level=level, name=kind, message=line_of(kind, data))

@@ -1,7 +1,8 @@
 """A session as tables for notebooks: trajectory, events and contacts, as CSV or Parquet files.
 
-House units, as the records have them: mm, rad, s; `wall_ns` is ns since 1970 on the session's time
-line. What a table has no value for is empty.
+House units, as the records have them: mm, rad, s. Each row has both clocks: `wall_ns`, the time of
+day as ns since 1970, and `cell_s`, the cell's clock, which the records call t and which a simulated
+cell may run faster. What a table has no value for is empty.
 """
 
 import csv
@@ -19,7 +20,7 @@ from legato.records.record import SessionRecord
 from legato.records.trajectory import COLUMNS
 
 Table = dict[str, list[Any]]
-AXES = "xyz"
+AXES, CELL = "xyz", "cell_s"
 
 
 class NeedsLibrary(RuntimeError):
@@ -54,18 +55,19 @@ def trajectory(record: SessionRecord) -> Table:
     """Return trajectory.csv's columns with the time of each row."""
     line, path = time_line(record), record.trajectory
     columns: Table = {"wall_ns": [line.at(t) for t in path["t"]]}
-    return columns | {name: [_plain(v) for v in path[name]] for name in COLUMNS}
+    rest = {CELL if n == "t" else n: [_plain(v) for v in path[n]] for n in COLUMNS}
+    return columns | rest
 
 
 def events(record: SessionRecord) -> Table:
     """Return every event, its data as JSON text."""
     line = time_line(record)
     rows = [
-        {"wall_ns": line.at(e["t"]), "seq": e["seq"], "wall": e["wall"], "t": e["t"],
+        {"wall_ns": line.at(e["t"]), CELL: e["t"], "seq": e["seq"], "wall": e["wall"],
          "kind": e["kind"], "data": json.dumps(e.get("data"), ensure_ascii=False)}
         for e in record.events
     ]  # fmt: skip
-    return _columns(rows, ("wall_ns", "seq", "wall", "t", "kind", "data"))
+    return _columns(rows, ("wall_ns", CELL, "seq", "wall", "kind", "data"))
 
 
 def contacts(record: SessionRecord) -> Table:
@@ -79,13 +81,13 @@ def contacts(record: SessionRecord) -> Table:
     rows = []
     for event in record.of_kind("contact"):
         data = event["data"]
-        row = {"wall_ns": line.at(event["t"]), "t": event["t"], **{k: data.get(k) for k in plain}}
+        row = {"wall_ns": line.at(event["t"]), CELL: event["t"], **{k: data.get(k) for k in plain}}
         row["sigma_mm"] = sigma.get(data.get("station_mm"))
         for key, name in places.items():
             row |= dict(zip((f"{name}_{a}_mm" for a in AXES), data.get(key) or (), strict=False))
         rows.append(row)
     named = [f"{name}_{a}_mm" for name in places.values() for a in AXES]
-    return _columns(rows, ("wall_ns", "t", *plain, "sigma_mm", *named))
+    return _columns(rows, ("wall_ns", CELL, *plain, "sigma_mm", *named))
 
 
 def _columns(rows: list[dict[str, Any]], names: tuple[str, ...]) -> Table:

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from legato.geometry.transforms import Array
 
 INCH = 25.4
-JOINT_NAMES = ("base", "shoulder", "elbow", "pitch", "roll")
 MOTOR_NAMES = ("base", "shoulder", "elbow", "right wrist", "left wrist", "gripper")
 
 
@@ -110,7 +109,9 @@ def broken_limits(model: ArmModel, joints: ArrayLike, tolerance: float = 1e-9) -
         return ["out of reach"]
     lim = model.limits
     found = []
-    spare = f", {-np.degrees(tolerance):.1f} deg to spare" if tolerance < 0.0 else ""
+    off = max(-tolerance, 0.0)
+    digits, ends = (2, 2) if off else (1, 0)
+    spare = f" deg, {np.degrees(off):.1f} deg within its ends" if off else " deg"
     for name, value, (low, high) in (
         ("base", t1, lim.base),
         ("shoulder", t2, lim.shoulder),
@@ -120,8 +121,8 @@ def broken_limits(model: ArmModel, joints: ArrayLike, tolerance: float = 1e-9) -
     ):
         if not low - tolerance <= value <= high + tolerance:
             found.append(
-                f"{name} {np.degrees(value):.1f} deg is outside "
-                f"{np.degrees(low):.0f} to {np.degrees(high):.0f} deg{spare}"
+                f"{name} {np.degrees(value):.{digits}f} deg is outside "
+                f"{np.degrees(low + off):.{ends}f} to {np.degrees(high - off):.{ends}f}{spare}"
             )
     return found + _body_conflicts(model, t1, t2, t3, pitch)
 

@@ -15,6 +15,11 @@ def session_id(started: str, token: str) -> str:
     return checked_id(f"{time}-{token}")
 
 
+def began(session: str) -> datetime:
+    """Return the second at which a session began, as its id tells it."""
+    return datetime.strptime(session.partition("-")[0], "%Y%m%dT%H%M%S%z")
+
+
 def moment(iso: str) -> datetime:
     """Return an ISO time in UTC; raises ValueError."""
     time = datetime.fromisoformat(iso)

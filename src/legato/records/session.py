@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from legato.records.chain import EFFECTS, EVENTS, SESSION, digest, event_line
-from legato.records.errors import RecordError
-from legato.records.files import LineFile, encode, make_folder, replace_file
+from legato.records.errors import RecordError, told
+from legato.records.files import LineFile, encode, make_folder, replace_file, sync_folder
 from legato.records.ids import checked_name
 from legato.records.trajectory import header_line, row_line
 
@@ -36,6 +36,7 @@ class SessionWriter:
         self._seq = 0
         self._last = ""
         self._open = True
+        self._placed = False  # for good: the folder's own entry is on the disk
 
     def event(
         self, kind: str, data: Mapping[str, Any], *, t: float, wall: str, durable: bool = False
@@ -54,6 +55,11 @@ class SessionWriter:
                 # A line that stands in the file counts, even where it could not be made durable.
                 if self._events.lines > before:
                     self._seq, self._last = before + 1, digest(line)
+            if durable and not self._placed:
+                # After the line: one commit of the file system's journal then serves both.
+                with told("write", self.path):
+                    sync_folder(self.path.parent)
+                self._placed = True
             return self._seq
 
     def frame(self, name: str, png: bytes) -> str:
@@ -61,8 +67,12 @@ class SessionWriter:
         place = f"{FRAMES}/{checked_name(name)}.png"
         with self._lock:
             self._needs_open()
+            first = not (self.path / FRAMES).exists()
             make_folder(self.path / FRAMES)
             self._replace(place, png)
+            if first:
+                with told("write", self.path):
+                    sync_folder(self.path)
         return place
 
     def document(self, name: str, document: Mapping[str, Any]) -> None:

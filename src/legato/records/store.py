@@ -24,11 +24,10 @@ from legato.records.files import (
     read_object,
     remove_folder,
     replace_file,
-    sync_folder,
 )
-from legato.records.ids import SESSION_ID, checked_id, moment, session_id
+from legato.records.ids import SESSION_ID, began, checked_id, moment, session_id
 from legato.records.record import SessionRecord, read_session
-from legato.records.session import FRAMES, SessionWriter
+from legato.records.session import SessionWriter
 from legato.records.whole import file_hashes
 
 BEGUN = ".begun-"
@@ -64,7 +63,8 @@ class Store:
     def begin(self, meta: Mapping[str, Any]) -> SessionWriter:
         """Begin a session's record; `meta` is session.json's content, with `started` in ISO.
 
-        Raises RecordError where the disk does not take it: then there is no session.
+        Its first durable event makes sure that it outlasts a power cut. Raises RecordError where
+        the disk does not take it: then there is no session.
         """
         make_folder(self.folder)
         for _ in range(64):
@@ -81,7 +81,6 @@ class Store:
         if fresh.exists():
             remove_folder(fresh)
         make_folder(fresh)
-        make_folder(fresh / FRAMES)
         with told("begin a session in", self.folder):
             try:
                 (fresh / EVENTS).touch(mode=0o640)
@@ -92,16 +91,16 @@ class Store:
                     raise
                 remove_folder(fresh)
                 return False
-            sync_folder(self.folder)
         return True
 
     def read(self, session: str) -> SessionRecord:
         """Return one session's record; raises RecordError where there is none."""
         return read_session(self._path(session))
 
-    def sessions(self) -> list[Summary]:
-        """Return every session, newest first."""
-        found = [self._summary(path) for path in self._paths()]
+    def sessions(self, newest: int | None = None) -> list[Summary]:
+        """Return every session, newest first; with `newest` only so many are read."""
+        paths = sorted(self._paths(), reverse=True)[:newest]
+        found = [self._summary(path) for path in paths]
         return sorted(found, key=lambda s: (s.started, s.id), reverse=True)
 
     def unfinished(self) -> list[str]:
@@ -151,13 +150,25 @@ class Store:
         latest, whatever the clock says, and all that ended within a day.
         """
         self.sweep((PRUNED,))
-        removed = []
-        for summary in self.sessions()[keep_newest:][::-1]:
-            if summary.outcome is None or not _older(summary, now - DAY):
+        removed: list[str] = []
+        too_old, a_day_old = now - timedelta(days=keep_days), now - DAY
+        short: bool | None = None  # unknown as long as nobody needs to know
+        for path in sorted(self._paths(), reverse=True)[keep_newest:][::-1]:
+            # None ends before it begins: what is too young by its name is not even read.
+            begun = began(path.name)
+            if begun >= a_day_old:
+                break
+            if begun >= too_old:
+                short = self.free_mb() < min_free_mb if short is None else short
+                if not short:
+                    break
+            summary = self._summary(path)
+            if summary.outcome is None or not _older(summary, a_day_old):
                 continue
-            if _older(summary, now - timedelta(days=keep_days)) or self.free_mb() < min_free_mb:
+            if short or _older(summary, too_old):
                 self._remove(summary.id)
                 removed.append(summary.id)
+                short = None
         return removed
 
     def _remove(self, session: str) -> None:
@@ -236,8 +247,7 @@ class Store:
 
 def _stand_in(path: Path) -> dict[str, Any]:
     """Return what a session's name alone tells."""
-    started = datetime.strptime(path.name.partition("-")[0], "%Y%m%dT%H%M%S%z")
-    return {"id": path.name, "job": "unknown", "started": started.isoformat()}
+    return {"id": path.name, "job": "unknown", "started": began(path.name).isoformat()}
 
 
 def _seal(path: Path) -> dict[str, Any]:

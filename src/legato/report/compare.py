@@ -12,6 +12,7 @@ import numpy as np
 from legato.geometry.transforms import Array, apply
 from legato.records.record import SessionRecord
 from legato.report import facts
+from legato.report.figures.curves import Stay
 from legato.report.score import Score, score
 
 ABSENT = "\N{EN DASH}"
@@ -28,7 +29,10 @@ class Pose:
 
 @dataclass(frozen=True)
 class Side:
-    """One session's own figures; None where it has none."""
+    """One session's own figures; None where it has none.
+
+    `seconds` are the wall's; `stays` has the cell's seconds by state, `course` each stay in order.
+    """
 
     number: int
     id: str
@@ -46,6 +50,7 @@ class Side:
     error_mm: float | None
     pose: Pose | None
     stays: dict[str, float]
+    course: tuple[Stay, ...]
 
 
 @dataclass(frozen=True)
@@ -121,7 +126,8 @@ def _side(number: int, record: SessionRecord, told: Score, pose: Pose | None) ->
     sigmas = [s.get("sigma_mm") for s in solved.get("stations") or ()]
     heights = [float(c["contact_mm"]) for c in facts.contacts(record)]
     stays: dict[str, float] = {}
-    for stay in facts.stays(record):
+    course = tuple(facts.stays(record))
+    for stay in course:
         stays[stay.state] = stays.get(stay.state, 0.0) + stay.seconds
     return Side(
         number=number,
@@ -140,6 +146,7 @@ def _side(number: int, record: SessionRecord, told: Score, pose: Pose | None) ->
         error_mm=told.worst_mm,
         pose=pose,
         stays=stays,
+        course=course,
     )
 
 

@@ -4,16 +4,17 @@ Whatever a session never came to is None or empty; the template leaves it out.
 """
 
 from collections.abc import Iterable, Mapping
-from datetime import datetime
 from typing import Any
 
 import numpy as np
 
 from legato.calibration.problem import PAPER_BOUNDS
+from legato.control.band import Band, band, bands
 from legato.geometry.transforms import Array
 from legato.records.chain import verify_chain
 from legato.records.errors import RecordError
 from legato.records.record import SessionRecord
+from legato.report.clock import cell_seconds, moment, pace
 from legato.report.figures.curves import Stay
 from legato.report.paper import TABLE_5_3
 from legato.report.scene import Scene
@@ -44,16 +45,25 @@ def headline(record: SessionRecord) -> Row:
         "cause": record.meta.get("cause"),
         "simulated": bool(record.meta.get("simulated")),
         "seconds": duration(record),
+        **clocks(record),
+    }
+
+
+def clocks(record: SessionRecord) -> Row:
+    """Return how the cell's clock ran: `pace` as text and `cell_s`, None where it is the wall's."""
+    rate = pace(record)
+    other = rate != 1.0
+    return {
+        "pace": f"{rate:g}" if other else None,
+        "cell_s": cell_seconds(record) if other else None,
+        "seconds_of": "s of the cell" if other else "s",
     }
 
 
 def duration(record: SessionRecord) -> float | None:
     """Return the wall seconds from request to end, None where either is unknown."""
-    try:
-        ends = [datetime.fromisoformat(str(record.meta[k])) for k in ("started", "ended")]
-        return (ends[1] - ends[0]).total_seconds()
-    except (KeyError, ValueError, TypeError):
-        return None
+    began, ended = (moment(record.meta.get(key)) for key in ("started", "ended"))
+    return None if began is None or ended is None else (ended - began).total_seconds()
 
 
 def warnings(record: SessionRecord) -> list[str]:
@@ -80,18 +90,14 @@ def warnings(record: SessionRecord) -> list[str]:
     return found + [f"A part of the record cannot be read: {d}." for d in record.damage]
 
 
-def faults(record: SessionRecord) -> list[Row]:
-    """Return every fault of the session with its evidence, the one that ended it first."""
-    found = []
-    for event in reversed(record.of_kind("fault")):
-        evidence = event["data"].get("evidence")
-        found.append(
-            {
-                **{key: event["data"].get(key) for key in ("cause", "text", "hint")},
-                "evidence": evidence if isinstance(evidence, dict) else {},
-                "wall": event.get("wall"),
-            }
-        )
+def contact_bands(record: SessionRecord) -> dict[float, Band]:
+    """Return each station's band; of a station without an estimate the accepted one alone."""
+    window = ((record.meta.get("config") or {}).get("massage") or {}).get("contact_window_mm")
+    stations = (record.calibration or {}).get("stations") or ()
+    found = {b.station_mm: b for b in bands(stations, window)}
+    for row in contacts(record):
+        place = float(row["station_mm"])
+        found.setdefault(place, band(place, None, window))
     return found
 
 
@@ -106,7 +112,7 @@ def search(solved: Mapping[str, Any]) -> list[str]:
         share = 100.0 * float(solved["agreement"])
         found.append(f"{share:.0f} % of the refined candidates agree on the optimum")
     if solved.get("seconds") is not None:
-        found.append(f"{solved['seconds']:.2f} s")
+        found.append(f"{solved['seconds']:.2f} s of computing")
     return found
 
 

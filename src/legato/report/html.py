@@ -8,7 +8,8 @@ import numpy as np
 from legato.records.errors import told as told_error
 from legato.records.files import make_folder, replace_file
 from legato.records.record import SessionRecord
-from legato.report import facts
+from legato.report import facts, happened
+from legato.report.clock import day
 from legato.report.figures import canvas, closeups, curves, picture, space
 from legato.report.paper import PLACEMENT_ERROR_MM, POSES
 from legato.report.scene import Scene, scene_of
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 TEMPLATE = "session.html.j2"
-LAST_EVENTS = 12
+NOTHING = 1e-12
 SAID = "not separately observable"  # the template says it beside the table
 
 
@@ -53,6 +54,7 @@ def environment(**options: Any) -> "Environment":
         **options,
     )
     made.filters |= {"num": number, "told": facts.told, "figure_text": significant}
+    made.filters |= {"day": shown_day, "beside": beside}
     return made
 
 
@@ -64,7 +66,7 @@ def content(record: SessionRecord) -> dict[str, Any]:
         "meta": record.meta,
         "head": facts.headline(record),
         "warnings": facts.warnings(record),
-        "faults": facts.faults(record),
+        "faults": happened.faults(record),
         "solved": solved,
         "search": facts.search(solved),
         "remarks": [w for w in solved.get("warnings") or () if SAID not in w],
@@ -77,7 +79,7 @@ def content(record: SessionRecord) -> dict[str, Any]:
         "paper_error": PLACEMENT_ERROR_MM,
         "stays": facts.stays(record),
         "settings": facts.settings(record.meta.get("config") or {}),
-        "events": record.events[-LAST_EVENTS:],
+        "events": happened.events(record),
         "event_count": len(record.events),
         "moves": int(record.trajectory["t"].size),
         **_pictures(record, scene),
@@ -113,12 +115,8 @@ def _figures(record: SessionRecord, scene: Scene | None) -> dict[str, str | None
     solved, touched, stays = record.calibration or {}, facts.contacts(record), facts.stays(record)
     trace = solved.get("trace") or {}
     config = record.meta.get("config") or {}
-    pressed = facts.profiles(record, solved)
+    pressed, seconds = facts.profiles(record, solved), facts.clocks(record)["seconds_of"]
     true_pose = (record.truth or {}).get("world_from_object")
-    sigma = {
-        float(s["station_mm"]): float(s.get("sigma_mm") or 0.0)
-        for s in solved.get("stations") or ()
-    }
     return {
         "cost": curves.cost(trace["best"], trace.get("mean") or (), facts.refined_cost(solved))
         if trace.get("best")
@@ -132,21 +130,33 @@ def _figures(record: SessionRecord, scene: Scene | None) -> dict[str, str | None
         )
         if record.trajectory["t"].size
         else None,
-        "heights": curves.contact_heights(
-            touched, sigma, (config.get("massage") or {}).get("contact_window_mm")
-        )
+        "heights": curves.contact_heights(touched, facts.contact_bands(record))
         if touched
         else None,
-        "press": curves.press_profiles(pressed) if pressed else None,
+        "press": curves.press_profiles(pressed, seconds) if pressed else None,
         "timeline": curves.timeline(stays) if stays else None,
     }
 
 
 def significant(value: Any) -> str:
-    """Return a figure of any size with three significant digits."""
+    """Return a figure of any size with three significant digits; what rounding leaves is 0."""
     if value is None:
         return "\N{EN DASH}"
+    if abs(float(value)) < NOTHING:
+        return "0"
     return f"{float(value):.3g}".replace("-", "\N{MINUS SIGN}")
+
+
+def shown_day(wall: Any) -> str:
+    """Return a time of a record with its date for people; what is no time as it stands."""
+    return day(wall) or str(wall)
+
+
+def beside(value: Any, sigma: Any) -> str:
+    """Return a figure with as many decimals as its standard deviation `sigma` is worth."""
+    known = sigma is not None and 0.0 < float(sigma) < 1.0
+    decimals = int(-np.floor(np.log10(float(sigma)))) + 1 if known else 3
+    return number(value, min(max(decimals, 3), 9))
 
 
 def number(value: Any, decimals: int = 2, *, sign: bool = False) -> str:

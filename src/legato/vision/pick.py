@@ -240,7 +240,7 @@ def _snapped(
     taken: dict[int, str] = {}
     pairs = []
     for name, pick in picks.items():
-        d = np.linalg.norm(candidates.pixels - np.asarray(pick, dtype=float), axis=-1)
+        d = np.hypot(*(candidates.pixels - np.asarray(pick, dtype=float)).T)
         missing[name] = f"no mark within {reach:.0f} px of the pick"
         pairs += [(float(d[k]), name, int(k)) for k in np.flatnonzero(d <= reach)]
     for _, name, k in sorted(pairs):

@@ -5,7 +5,7 @@ looked for again until it is back; whatever it said meanwhile is asked for by it
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from legato.daemon.client import Client, DaemonUnavailable, RpcError
@@ -15,6 +15,7 @@ SILENT_S = 2.5  # heartbeats come every second: so long a silence is a daemon th
 AGAIN_S = 0.3
 REFUSED_S = 2.0
 ANSWER_S = 2.0
+STOP_S = 0.5
 TURNS = ("state", "session", "fault", "heartbeat")  # what makes status worth asking for
 PAST = 30
 
@@ -25,11 +26,22 @@ class Feed:
     """One follower; `post(kind, what)` is called in its thread.
 
     Kinds are `described`, `status`, `sessions` (answers), `event` (topic and event), `up`, and
-    `lost` (reason and hint).
+    `lost` (reason, hint, and whether the stop line answers, None while that is not known).
     """
 
-    def __init__(self, requests: str, events: str, keys: Keys | None, post: Post) -> None:
-        self._lines = requests, events
+    def __init__(
+        self,
+        lines: Mapping[str, str],
+        keys: Keys | None,
+        post: Post,
+        *,
+        answer_s: float = ANSWER_S,
+        stop_s: float = STOP_S,
+    ) -> None:
+        self._waits = answer_s, stop_s
+        self._lines = lines["requests"], lines["events"]
+        self._stop_line = lines["stop"]
+        self._stops: bool | None = None
         self._keys = keys
         self._post = post
         self._ended = threading.Event()
@@ -46,16 +58,16 @@ class Feed:
     def _run(self) -> None:
         while not self._ended.is_set():
             try:
-                with Client(*self._lines, timeout_s=ANSWER_S, keys=self._keys) as client:
+                with Client(*self._lines, timeout_s=self._waits[0], keys=self._keys) as client:
                     self._stay(client)
             except RpcError as error:
                 # A refused key: the daemon may be another one tomorrow.
                 reason, hint = error.data.get("reason") or error.message, error.data.get("hint")
-                self._post("lost", (str(reason), str(hint or "")))
+                self._lose(str(reason), str(hint or ""))
                 self._ended.wait(REFUSED_S)
             except Exception as error:  # noqa: BLE001  # pages must learn that nobody listens
                 text = f"a bug in the page's server: {type(error).__name__}: {error}"
-                self._post("lost", (text, "report it; it is tried again"))
+                self._lose(text, "report it; it is tried again")
                 self._ended.wait(REFUSED_S)
 
     def _stay(self, client: Client) -> None:
@@ -64,8 +76,21 @@ class Feed:
             try:
                 self._follow(client)
             except DaemonUnavailable as error:
-                self._post("lost", (str(error), "see that `legato serve` runs"))
+                self._lose(str(error), "see that `legato serve` runs")
                 self._ended.wait(AGAIN_S)
+
+    def _lose(self, reason: str, hint: str) -> None:
+        """Post that nothing is heard; and whether a stop would be, which takes longer to know."""
+        self._post("lost", (reason, hint, self._stops))
+        try:
+            with Client(self._stop_line, timeout_s=self._waits[1], keys=self._keys) as client:
+                client.call("ping")
+            self._stops = True
+        except RpcError:
+            self._stops = True  # an answer all the same
+        except DaemonUnavailable:
+            self._stops = False
+        self._post("lost", (reason, hint, self._stops))
 
     def _follow(self, client: Client) -> None:
         """Post all that a daemon says until it is silent. Raises DaemonUnavailable, RpcError."""
@@ -86,6 +111,7 @@ class Feed:
         """Ask for everything that no event tells; return the daemon's boot."""
         self._post("described", client.call("describe"))
         status = client.call("status")
+        self._stops = None
         self._post("up", None)
         self._post("status", status)
         self._post("sessions", client.call("sessions", limit=PAST)["sessions"])

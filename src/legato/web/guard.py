@@ -25,7 +25,6 @@ HEADERS: Final = {
     "cache-control": "no-store",
     "content-security-policy": POLICY,
 }
-SAFE: Final = ("GET", "HEAD")
 
 
 def hosts(port: int) -> frozenset[str]:

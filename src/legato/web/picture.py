@@ -16,6 +16,7 @@ from legato.report.scene import Scene, scene_of, silhouette, surface_samples
 
 ARROW_PX = 38.0  # length of the longest residual as it is drawn
 SCALES = [m * 10.0**e for e in range(5) for m in (1, 2, 5)]
+KEPT = "start-calibrated.png"
 PNG = b"\x89PNG\r\n\x1a\n"
 SOLVED = (
     "accepted", "reasons", "rms_px", "engine", "agreement", "warnings", "missing", "suspects",
@@ -34,6 +35,7 @@ def view_of(record: SessionRecord) -> dict[str, Any] | None:
         return None
     view: dict[str, Any] = {
         "session": record.id,
+        "boot": record.meta.get("boot"),
         "job": record.meta.get("job"),
         "started": record.meta.get("started"),
         "simulated": bool(record.meta.get("simulated")),
@@ -50,8 +52,11 @@ def view_of(record: SessionRecord) -> dict[str, Any] | None:
 
 
 def picture_name(record: SessionRecord) -> str | None:
-    """Return the picture that was solved, else the last one taken."""
-    names = [f"frames/{f.name}" for f in record.frames]
+    """Return the picture that was solved, else the last one taken.
+
+    The copy of an earlier session's solved picture, for replays, is none of this session.
+    """
+    names = [f"frames/{f.name}" for f in record.frames if f.name != KEPT]
     solved = str((record.calibration or {}).get("picture") or "")
     return solved if solved in names else next(reversed(names), None)
 
@@ -88,7 +93,6 @@ def overlay(scene: Scene, solved: Mapping[str, Any]) -> dict[str, Any]:
         "outline": outline(scene),
         "faces": [ring(scene, x) for x in (0.0, scene.leg.length)],
         "stations": [station(scene, s) for s in scene.stations],
-        "sigma_mm": {f"{s['station_mm']:g}": s["sigma_mm"] for s in solved.get("stations") or ()},
     }
 
 

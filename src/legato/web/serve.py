@@ -34,10 +34,10 @@ def serve(
         port = int(listening.getsockname()[1])
         pages = Pages()
         shelf = Shelf(setup.state_dir)
-        site = Site(pages, Board(setup.model, pages.publish), shelf)
+        site = Site(pages, Board(setup.model, pages.publish, setup.time_scale), shelf)
         requests = Line(setup.lines["requests"], setup.keys, "act")
         stops = Line(setup.lines["stop"], setup.keys, "stop")
-        feed = Feed(setup.lines["requests"], setup.lines["events"], setup.keys, site.post)
+        feed = Feed(setup.lines, setup.keys, site.post)
         acts = Acts(requests, stops, token, setup.role)
         app = application(setup, site, shelf, acts, feed, port)
         config = uvicorn.Config(

@@ -13,6 +13,7 @@ from legato.config.decode import decode, read_toml
 from legato.config.endpoints import has_fixed_port, reachable
 from legato.config.errors import ConfigError
 from legato.config.load import Loaded
+from legato.control.band import ACCEPTED, EXPECTED
 from legato.control.settings import CellSettings
 from legato.control.table import OPERATOR
 from legato.daemon.keys import Keys, SecretFile, client_keys
@@ -24,6 +25,7 @@ class Setup:
     """Where the daemon is and who we are to it; `cell` is what the page draws that never changes.
 
     `role` is the client key's; without encryption everyone on this machine is an operator.
+    `time_scale` is how many of the cell's seconds pass in one of the wall's.
     """
 
     lines: Mapping[str, str]
@@ -32,6 +34,7 @@ class Setup:
     state_dir: Path
     model: ArmModel
     settings: CellSettings
+    time_scale: float
     cell: Mapping[str, Any]
 
 
@@ -53,8 +56,16 @@ def setup_of(loaded: Loaded) -> Setup:
         state_dir=Path(config.records.state_dir),
         model=arm_model(config),
         settings=cell_settings(loaded),
+        time_scale=time_scale(loaded),
         cell=cell_told(loaded),
     )
+
+
+def time_scale(loaded: Loaded) -> float:
+    """Return how fast the cell's time goes: faster than the wall's only where all is simulated."""
+    config = loaded.config
+    simulated = config.robot.driver == "sim" and config.camera.driver == "sim"
+    return config.sim.time_scale if simulated else 1.0
 
 
 def cell_told(loaded: Loaded) -> dict[str, Any]:
@@ -64,6 +75,8 @@ def cell_told(loaded: Loaded) -> dict[str, Any]:
     camera = config.camera
     return {
         "stations_mm": table.stations_mm,
+        "time_scale": time_scale(loaded),
+        "bands": {"expected": EXPECTED, "accepted": ACCEPTED},
         "contact_window_mm": config.massage.contact_window_mm,
         "descent_mm": config.massage.descent_mm,
         "strokes": config.massage.strokes,

@@ -11,14 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from legato.control.band import bands
 from legato.records.errors import RecordError
 from legato.records.record import SessionRecord
 from legato.records.store import Store
 from legato.web.picture import view_of
+from legato.web.present import Contacts
 
 RECENT = 12  # sessions looked through for a picture or contacts
 REPORT_S = 60.0
 KEPT = 4  # reports
+FINDING = ("run", "calibrate")  # jobs that look for the leg
 
 
 class NoReport(Exception):
@@ -31,6 +34,10 @@ class Seen:
 
     view: dict[str, Any] | None
     contacts: list[dict[str, Any]]
+    bands: list[dict[str, Any]] | None
+    """By the record's own calibration."""
+    finds: bool
+    """Whether its job looked for the leg, and found it."""
 
 
 class Shelf:
@@ -43,21 +50,23 @@ class Shelf:
         self._views: dict[tuple[object, ...], dict[str, Any] | None] = {}
 
     def look(self) -> dict[str, Any]:
-        """Return `picture`, the newest view; `solved`, the newest with a calibration; `contacts`.
+        """Return `picture`, the newest view; `solved`, the newest with a calibration; `touched`.
 
-        Contacts are (session, rows) of the newest session that touched the leg. Each is None where
-        there is none.
+        `touched` are the Contacts of the newest session that touched the leg. Each is None where
+        there is none. `solved` and `touched` say `by` which session's pose they are.
         """
-        found: dict[str, Any] = dict.fromkeys(("picture", "solved", "contacts"))
+        found: dict[str, Any] = dict.fromkeys(("picture", "solved", "touched"))
         for session, seen in self._recent():
             if seen.view is not None:
                 found["picture"] = found["picture"] or seen.view
-                if seen.view["solved"] is not None:
-                    found["solved"] = found["solved"] or seen.view
-            if seen.contacts:
-                found["contacts"] = found["contacts"] or (session, seen.contacts)
-            if None not in found.values():
-                break
+                if found["solved"] is None and seen.view["solved"] is not None:
+                    found["solved"] = {**seen.view, "by": None}
+            if found["touched"] is None and seen.contacts:
+                found["touched"] = Contacts(session, None, seen.bands, seen.contacts)
+            if seen.finds:
+                _made_by(found, session, seen.bands)
+                if None not in found.values():
+                    break
         return found
 
     def frame(self, session: str, name: str) -> bytes:
@@ -100,7 +109,12 @@ class Shelf:
         """Read a session; what has ended is read once."""
         record = self._store.read(session)
         rows = [dict(event["data"]) for event in record.of_kind("contact")]
-        seen = Seen(self._view(record), rows)
+        solved = record.calibration
+        massage = (record.meta.get("config") or {}).get("massage") or {}
+        finds = solved is not None and record.meta.get("job") in FINDING
+        own = bands((solved or {}).get("stations") or (), massage.get("contact_window_mm"))
+        told = [band.told() for band in own] or None
+        seen = Seen(self._view(record), rows, told, finds)
         if record.finished:
             self._ended[session] = seen
         return seen
@@ -113,6 +127,15 @@ class Shelf:
         if key not in self._views:
             self._views = {key: view_of(record)}
         return self._views[key]
+
+
+def _made_by(found: dict[str, Any], session: str, own: list[dict[str, Any]] | None) -> None:
+    """Note that what was found since a session is of the pose that it found."""
+    if found["solved"] is not None and found["solved"]["by"] is None:
+        found["solved"]["by"] = session
+    touched = found["touched"]
+    if touched is not None and touched.by is None:
+        touched.by, touched.bands = session, touched.bands or own
 
 
 def drawn(folder: Path) -> bytes:

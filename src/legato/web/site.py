@@ -58,8 +58,8 @@ class Site:
                 # The moment at which it was lost stays; only the reason may change.
                 if self._up:
                     self._up, self._lost_at = False, wall
-                reason, hint = what
-                self._board.lost(reason, hint, self._lost_at)
+                reason, hint, stop = what
+                self._board.lost(reason, hint, self._lost_at, stop)
             case "described":
                 self._board.described(what)
             case "status":
@@ -83,7 +83,4 @@ class Site:
             self._again = False
             loop = asyncio.get_running_loop()
             found = await loop.run_in_executor(self._reader, self._shelf.look)
-            self.pages.publish("picture", found["picture"])
-            self.pages.publish("solved", found["solved"])
-            if found["contacts"] is not None:
-                self._board.recorded(*found["contacts"])
+            self._board.looked(**found)

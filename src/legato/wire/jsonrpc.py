@@ -74,7 +74,17 @@ class _Envelope(Struct, frozen=True, forbid_unknown_fields=True):
     params: dict[str, Any] = {}
 
 
+class _Id(Struct, frozen=True):
+    """Of a request that is not read, the one thing that its sender knows the answer by."""
+
+    id: int | float | str | None = None
+
+
 _ENVELOPE: Final = msgspec.json.Decoder(_Envelope)
+_ID: Final = msgspec.json.Decoder(_Id)
+# msgspec learns a type when it is first used, and crashes the process where two threads, here the
+# loop and the stop line, come to do so at once: it learns them all while there is but one.
+_LEARNT: Final = [msgspec.json.Decoder(kind) for kind in (*REQUESTS.values(), *STOP_LINE.values())]
 
 
 def receive(frames: Sequence[bytes]) -> Call | Malformed:
@@ -84,8 +94,7 @@ def receive(frames: Sequence[bytes]) -> Call | Malformed:
         text = f"a request is one frame of JSON, this message has {len(frames) - 1}"
         return Malformed(route, Failure("invalid_request", text))
     if len(body) > MAX_BYTES:
-        text = f"{len(body)} bytes, at most {MAX_BYTES}"
-        return Malformed(route, Failure("invalid_request", text))
+        return Malformed(route, too_long(len(body)), _id_of(body))
     # So few brackets cannot nest too deep; most requests need no closer look.
     shallow = body.count(b"{") + body.count(b"[") <= MAX_DEPTH
     usual = _usual(route, body) if shallow else None
@@ -96,6 +105,12 @@ def receive(frames: Sequence[bytes]) -> Call | Malformed:
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError, ValueError) as error:
         return Malformed(route, Failure("parse_error", f"not JSON: {error}"))
     return _call(route, document, shallow=shallow)
+
+
+def too_long(size: int) -> Failure:
+    """Return the error of a request of so many bytes."""
+    reason = f"the request has {size} bytes, at most {MAX_BYTES} are allowed"
+    return Failure("invalid_request", reason, "send less at a time")
 
 
 def decode_params(call: Call) -> Request:
@@ -197,6 +212,15 @@ def _call(route: Route, document: Any, *, shallow: bool) -> Call | Malformed:
     if not isinstance(params, dict):
         return malformed("params is an object: parameters go by name", "invalid_params")
     return Call(route, method, params, call_id, notification="id" not in document)
+
+
+def _id_of(body: bytes) -> Id:
+    """Return the id in a body that is not looked at any further, None where there is none."""
+    try:
+        found = _ID.decode(body).id
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        return None
+    return found if _is_id(found) else None
 
 
 def _is_id(value: Any) -> bool:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from legato.calibration.cost import prepare
 from legato.calibration.paper import solve_paper
@@ -53,6 +54,21 @@ def test_the_seed_decides(scenes: Any) -> None:
     np.testing.assert_array_equal(one.genes, same.genes)
     assert one.trace == same.trace
     assert (one.genes != other.genes).any()
+
+
+def test_whoever_must_be_heeded_ends_the_search(scenes: Any) -> None:
+    """What `heed` raises comes out before the next generation begins."""
+    heeded = 0
+
+    def heed() -> None:
+        nonlocal heeded
+        heeded += 1
+        if heeded == 3:
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        solve_paper(scenes.paper().problem, replace(SHORT, heed=heed), np.random.default_rng(7))
+    assert heeded == 3
 
 
 def test_what_it_does_not_reach_shows_in_its_sigmas(scenes: Any) -> None:

@@ -14,13 +14,7 @@ from legato.geometry.leg import Leg
 from legato.geometry.projection import Intrinsics
 from legato.geometry.transforms import invert, look_at
 from legato.hal.camera import Image
-from tests.unit.cli.samples import document, run, write_cell
-
-
-@pytest.fixture(scope="module")
-def cell(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a simulated cell's file."""
-    return write_cell(tmp_path_factory.mktemp("cell"))
+from tests.unit.cli.samples import document, run
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +75,13 @@ def test_odd_pictures_of_the_leg_give_its_marks(cell: Path, leg: Image, tmp_path
     for marks in places.values():
         assert set(marks) == set(plain)
         assert np.abs(np.array(list(marks.values())) - list(plain.values())).max() < 0.05
+
+
+@pytest.mark.parametrize("command", ["detect", "solve"])
+def test_a_file_that_is_not_there_is_a_slip_of_the_pen(
+    cell: Path, tmp_path: Path, command: str
+) -> None:
+    """Code 2, as for every wrong word on the command line, and the file's name."""
+    result = run(command, tmp_path / "none.png", "--config", cell)
+    assert result.exit_code == Exit.USAGE
+    assert f"there is no file {tmp_path / 'none.png'}" in result.stderr

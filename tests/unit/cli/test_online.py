@@ -91,6 +91,35 @@ def test_a_jobs_outcome_is_the_exit_code(cell: Path, outcome: str, code: Exit) -
     assert "because" in result.stderr
 
 
+@pytest.mark.parametrize("name", ["run", "calibrate"])
+def test_picks_go_to_the_daemon_as_they_stand_in_the_file(
+    cell: Path, tmp_path: Path, name: str
+) -> None:
+    """Marks named by a person are sent with the job; the daemon says which the leg has."""
+    picks = tmp_path / "picks.csv"
+    picks.write_text("name,u,v\nP1,100.5,200\nP2,300,400\n")
+    daemon = job("done")
+    daemon.answers = {name: {"session": "s1", "state": "calibrate"}}
+    assert run(name, "--config", cell, "--picks", picks, daemon=daemon).exit_code == 0
+    asked, params = daemon.asked[0]
+    assert (asked, params) == (name, {"picks": {"P1": (100.5, 200.0), "P2": (300.0, 400.0)}})
+
+
+def test_picks_that_cannot_be_read_are_said_before_anything_is_asked(
+    cell: Path, tmp_path: Path
+) -> None:
+    """Exit 2 with what a file of picks looks like; and a job that finds no leg takes none."""
+    picks = tmp_path / "picks.json"
+    picks.write_text('{"P1": [1]}')
+    daemon = job("done")
+    result = run("calibrate", "--config", cell, "--picks", picks, daemon=daemon)
+    assert result.exit_code == Exit.USAGE
+    assert "expected [u, v]" in result.stderr
+    assert daemon.asked == []
+    assert "--picks" not in run("home", "--help").stdout
+    assert "no such option" in run("home", "--picks", picks).stderr.lower()
+
+
 def test_no_wait_returns_at_once(cell: Path) -> None:
     """With --no-wait the session's id is the answer and nothing is awaited."""
     daemon = job("done")
@@ -156,7 +185,8 @@ def test_status_shows_the_cell(cell: Path) -> None:
     """State, session, arm, camera and calibration are told; JSON is the daemon's own answer."""
     result = run("status", "--config", cell, daemon=FakeDaemon({"status": STATUS}))
     assert result.exit_code == 0
-    for part in ("massage_67 (simulated)", "(1.0, 2.0, 3.0) mm", "67 mm", "verified, 3 s old"):
+    for part in ("massage_67 (simulated)", "(1.0, 2.0, 3.0) mm", "67 mm",
+                 "verified, 3 s old by the cell's clock", "0.5 s ago by the cell's"):  # fmt: skip
         assert part in result.stdout
     json_result = run("status", "--config", cell, "--json", daemon=FakeDaemon({"status": STATUS}))
     assert document(json_result) == STATUS
@@ -164,10 +194,11 @@ def test_status_shows_the_cell(cell: Path) -> None:
 
 def test_status_ends_with_4_in_fault(cell: Path) -> None:
     """A script can tell a fault by the code; a person sees cause and hint."""
-    answer = STATUS | {"state": "fault", "fault": FAULT, "calibration": None, "arm": {}}
+    past: dict[str, Any] = {"session": None, "calibration": None, "arm": {}}
+    answer = STATUS | past | {"state": "fault", "fault": FAULT}
     result = run("status", "--config", cell, daemon=FakeDaemon({"status": answer}))
     assert result.exit_code == Exit.FAULT
-    for part in ("contact_late: no contact", "look", "not connected"):
+    for part in ("contact_late: no contact", "look", "not connected", "1, ended by the fault"):
         assert part in result.stdout
 
 
@@ -196,9 +227,11 @@ def test_a_port_that_the_daemon_chooses_cannot_be_asked(tmp_path: Path) -> None:
 
 
 def test_watch_prints_events_as_lines(cell: Path) -> None:
-    """Events come one a line, heartbeats only on request."""
+    """Events come one a line, behind both clocks; heartbeats only on request."""
     quiet = run("watch", "--config", cell, "--count", "5", daemon=job("done"))
-    assert [line.split()[1] for line in quiet.stdout.splitlines()] == [
+    assert "the cell's clock" in quiet.stderr
+    assert [line.split()[1] for line in quiet.stdout.splitlines()][:2] == ["9.000", "1.000"]
+    assert [line.split()[2] for line in quiet.stdout.splitlines()] == [
         "contact", "state", "state", "progress", "contact",
     ]  # fmt: skip
     every = run("watch", "--config", cell, "--all", "--json", "--count", "7", daemon=job("done"))

@@ -1,6 +1,7 @@
 """The live view: what it knows, what it draws, and that it outlives the daemon."""
 
 import io
+import re
 import time
 from collections.abc import Callable, Iterator
 from typing import Any, cast
@@ -107,7 +108,7 @@ def test_silence_is_stale_and_no_answer_is_lost() -> None:
     assert "last known: idle" in page
     live.answered(status(), 21.0)
     assert live.link(21.0) == "live"
-    assert [text for _, topic, text in live.said if topic == "link"] == [
+    assert [said.text for said in live.said if said.topic == "link"] == [
         "the daemon does not answer; trying again", "the daemon answers again",
     ]  # fmt: skip
 
@@ -141,6 +142,100 @@ def test_a_fault_is_shown_with_what_to_do_until_it_is_left() -> None:
     assert fault_rows(told, 60) > fault_rows(told, 200)
     live.take("state", {"boot": "b1", "state": "idle"}, 14.0)
     assert "FAULT" not in drawn(live, 15.0)
+
+
+@pytest.mark.parametrize("width", [60, 80, 120, 200])
+def test_a_long_event_wraps_its_own_text_and_nothing_else(width: int) -> None:
+    """Time of day and topic stand whole beside a text that no terminal holds in one line."""
+    live = seen()
+    long = "the switch closed in the descent, 9.75 mm above the surface " * 5
+    live.take("fault", {"boot": "b1", "cause": "contact_early", "text": long}, 12.0)
+    live.take("contact", {"boot": "b1", "station_mm": 7.0, "contact_mm": -0.2}, 12.5)
+    rows = [line for line in drawn(live, 13.0, width, 40).splitlines()
+            if re.match(r"\W+\d\d:\d\d:\d\d ", line)]  # fmt: skip
+    assert [row.split()[2] for row in rows] == ["contact", "fault"]
+    assert "contact_early: the switch closed" in rows[1]
+    assert max(map(len, drawn(live, 13.0, width).splitlines())) <= width
+
+
+@pytest.mark.parametrize(("width", "height"), [(60, 20), (80, 24), (120, 24), (200, 50)])
+def test_the_arm_and_some_events_are_there_at_any_usual_size(width: int, height: int) -> None:
+    """Small terminals leave out frames and figures, and never the arm, the contacts, the events."""
+    live = seen()
+    follow(live)
+    page = drawn(live, 15.0, width, height)
+    for part in ("massage_67", "connected, referenced", "press at 67 mm", "-0.340", "4/12",
+                 "last events", "massage_67 "):  # fmt: skip
+        assert part in page
+    told = {"boot": "b1", "cause": "arm_lost", "text": "no answer " * 12, "hint": "plug it in"}
+    live.take("fault", told, 15.0)
+    live.take("state", {"boot": "b1", "state": "fault"}, 15.0)
+    page = drawn(live, 16.0, width, height)
+    for part in ("FAULT arm_lost", "plug it in", "legato reset", "connected, referenced",
+                 "arm_lost: no answer"):  # fmt: skip
+        assert part in page
+
+
+def beat(live: Live, t: float, uptime: float, now: float) -> None:
+    """Let a heartbeat come."""
+    event = {"boot": "b1", "state": live.state, "t": t, "uptime_s": uptime}
+    live.take("heartbeat", event, now)
+
+
+def test_a_clock_of_the_cell_that_runs_faster_is_told_and_converted() -> None:
+    """Ages are in the wall's seconds, and not told before the pace is known."""
+    live = seen()
+    live.status["camera"]["age_s"] = 60.0
+    beat(live, 1000.0, 50.0, 10.0)
+    assert live.pace is None
+    assert "picture" not in drawn(live, 10.5)
+    beat(live, 1020.0, 51.0, 11.0)
+    assert live.pace == pytest.approx(20.0)
+    page = drawn(live, 11.5)
+    assert "picture 3 s old" in page
+    assert "SIMULATED, clock x20" in page
+    assert "state, wall seconds" in page
+
+
+def test_a_clock_of_the_cell_that_is_the_walls_needs_no_word() -> None:
+    """At the same pace nothing is said of clocks."""
+    live = seen()
+    for second in range(3):
+        beat(live, 1000.0 + second, 50.0 + second, 10.0 + second)
+    assert live.pace == pytest.approx(1.0)
+    page = drawn(live, 12.5)
+    assert "clock" not in page
+    assert "wall seconds" not in page
+
+
+def test_what_was_sent_again_keeps_its_own_time_of_day() -> None:
+    """The latest of each topic, sent to a new subscriber, stands at the time it happened."""
+    live = seen()
+    live.take("session", {"boot": "b1", "t": 400.0, "id": "s0", "outcome": "done"}, 10.0)
+    live.take("state", {"boot": "b1", "t": 1015.0, "state": "capture"}, 10.8)
+    old, new = live.said
+    assert live.happened_at(old) == 10.0  # nothing better is known yet
+    beat(live, 1000.0, 50.0, 10.0)
+    beat(live, 1020.0, 51.0, 11.0)
+    assert live.happened_at(old) == pytest.approx(11.0 - 620.0 / 20.0)
+    assert live.happened_at(new) == pytest.approx(10.75)
+    live.answered(status(boot="b2"), 30.0)
+    assert live.pace is None
+
+
+def test_each_station_has_its_own_band() -> None:
+    """What is predicted, and where it fits what is accepted, are drawn as status tells them."""
+    live = seen()
+    follow(live)
+    live.status["calibration"]["stations"] = [
+        {"station_mm": 7.0, "sigma_mm": 0.1, "expected_mm": 0.2, "accepted_mm": 0.4},
+        {"station_mm": 67.0, "sigma_mm": 0.05, "expected_mm": 0.1, "accepted_mm": 0.4},
+    ]
+    live.take("contact", {"boot": "b1", "station_mm": 67.0, "contact_mm": 0.3}, 14.5)
+    page = drawn(live, 15.0)
+    assert "..[.@..o====|=====....].." in page
+    assert "==|==" in next(row for row in page.splitlines() if " 67 mm " in row and "@" in row)
+    assert "= predicted, \N{PLUS-MINUS SIGN} 2 sigma; [ ] accepted" in page
 
 
 @pytest.mark.parametrize(("width", "height"), [(20, 5), (60, 12), (80, 24), (250, 80)])

@@ -167,3 +167,13 @@ class House:
 
 
 CAMERA_LOST = FaultReport(Cause.CAMERA_LOST, "no picture", "plug it in", {"picture": None})
+
+
+def session_json(house: House, session: str) -> dict[str, Any]:
+    """Return a record's session.json."""
+    path = house.store.folder / session / "session.json"
+    found: dict[str, Any] = json.loads(path.read_text())
+    return found
+
+
+Maker = Callable[..., House]

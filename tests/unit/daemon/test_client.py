@@ -72,6 +72,14 @@ def test_nobody_there_is_told_and_not_waited_for() -> None:
                 client.call("status")
 
 
+def test_a_request_that_is_too_long_is_not_sent() -> None:
+    """It is refused here, with the limit, whether a daemon is there or not."""
+    with Client(NOBODY) as client, pytest.raises(RpcError, match="at most 65536") as caught:
+        client.call("session", session="x" * 70_000)
+    assert caught.value.message == "invalid_request"
+    assert caught.value.data["hint"]
+
+
 def test_an_answer_that_comes_too_late_is_not_the_next_one() -> None:
     """After a time-out the late answer is thrown away with its socket."""
     late: list[tuple[list[bytes], object]] = []

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 import zmq
 
+from legato.daemon import sockets
 from legato.daemon.gate import present
 from legato.daemon.loop import Loop
 from legato.daemon.mailbox import Mailbox
@@ -125,9 +126,21 @@ def test_odd_frames_do_no_harm(served: Served) -> None:
     dealer = served.client(zmq.DEALER)
     for frames in ([b""], [b"", b""], [b"a", b"b", b"c"], [b"", b"a", b"b"], [b"\xff" * 100]):
         assert "error" in served.answer(dealer, *frames)
-    dealer.send(b"x" * (MAX_BYTES + 1))
+    dealer.send(b"x" * (sockets.MAX_BYTES + 1))
     assert served.answer(served.client(zmq.REQ), ping())["result"]["state"] == "idle"
     assert served.house.desk.junk == 5
+
+
+def test_a_request_that_is_too_long_is_told_so(served: Served) -> None:
+    """By its id, with the limit; the next one of the same client is served."""
+    dealer = served.client(zmq.DEALER)
+    for size in (MAX_BYTES, sockets.MAX_BYTES - 200):
+        body = ping("me")[:-1] + b', "params": {"x": "' + b"y" * size + b'"}}'
+        answer = served.answer(dealer, body)
+        assert answer["id"] == "me"
+        assert answer["error"]["message"] == "invalid_request"
+        assert f"{len(body)} bytes, at most {MAX_BYTES}" in answer["error"]["data"]["reason"]
+    assert served.answer(dealer, ping())["result"]["state"] == "idle"
 
 
 def test_junk_on_the_events_socket_does_no_harm(served: Served) -> None:

@@ -13,6 +13,7 @@ from legato.config.load import shipped
 from legato.daemon.counts import Counts
 from legato.daemon.metrics import Collector, MetricsServer, Now, registry_of
 from legato.daemon.tally import Tally
+from legato.hal.faults import Cause
 
 STATES = ("idle", "capture", "massage_7", "fault")
 METRIC = re.compile(r"\b(?:legato|process)_[a-z_]+\b")
@@ -99,6 +100,15 @@ def test_every_figure_stands_on_the_page() -> None:
     assert "legato_calibration_sigma_mm" not in found
     assert any(name.startswith("legato_build_info{") for name in found)
     assert "process_resident_memory_bytes" in found
+
+
+def test_what_has_not_happened_yet_stands_there_as_0() -> None:
+    """Prometheus takes a series' first value for what was always there, and counts from it."""
+    found = samples(Counts((7.0, 187.0)), now())
+    assert all(found[f'legato_faults_total{{cause="{cause}"}}'] == 0.0 for cause in Cause)
+    assert found['legato_sessions_total{job="massage",outcome="interrupted"}'] == 0.0
+    assert all(found[f'legato_states_entered_total{{state="{state}"}}'] == 0.0 for state in STATES)
+    assert found['legato_contact_height_mm_bucket{le="+Inf",station="187"}'] == 0.0
 
 
 def test_a_latched_fault_is_shown_with_its_cause() -> None:

@@ -1,12 +1,16 @@
 """What a dead daemon left: open sessions are closed, faults stay, the arm's place is kept."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from legato.daemon.past import read_past
-from legato.records.store import Store
+from legato.daemon.messages import DevicesKnown
+from legato.daemon.past import LATEST, read_older, read_past
+from legato.daemon.sessions import KEPT
+from legato.records.store import Store, Summary
 from tests.unit.daemon.bench import STARTED, Silent
+from tests.unit.daemon.house import GOOD, House
 
 ARM = "teachmover /dev/ttyUSB0"
 
@@ -71,3 +75,52 @@ def test_a_damaged_state_is_as_good_as_none(store: Store, text: str) -> None:
     (store.state_dir / "state.json").write_text(text)
     past = read_past(store, Silent(), arm=ARM)
     assert (past.fault, past.last) == (None, (None, None))
+
+
+class Counted(Store):
+    """A store of so many finished sessions that counts how many of them are read."""
+
+    count = KEPT + 500
+    read_ones = 0
+
+    def _paths(self) -> Iterator[Path]:
+        """Yield the folders that there would be."""
+        for number in range(self.count):
+            yield (
+                self.folder
+                / f"20261101T{number // 3600:02}{number // 60 % 60:02}{number % 60:02}Z-0"
+            )
+
+    def _summary(self, path: Path) -> Summary:
+        """Count, then make one up."""
+        self.read_ones += 1
+        return Summary(path.name, "run", path.name, path.name, "done", None, None, True)
+
+
+def test_a_start_reads_no_more_for_there_being_more(tmp_path: Path) -> None:
+    """The latest before anybody is answered; those that are remembered beside them afterwards."""
+    store = Counted(tmp_path)
+    past = read_past(store, Silent(), arm=None)
+    assert store.read_ones == len(past.sessions) == LATEST
+    older = read_older(store, Silent())
+    assert store.read_ones == LATEST + KEPT
+    assert len({s.id for s in (*past.sessions, *older)}) == KEPT
+    assert max(s.id for s in older) < min(s.id for s in past.sessions)
+
+
+def test_an_older_session_without_an_end_is_a_fault_as_soon_as_it_is_found(tmp_path: Path) -> None:
+    """Its fault is kept before it is closed; the others are known, and their keys."""
+    house = House(tmp_path)
+    writers = [
+        house.store.begin({"job": "run", "started": STARTED, "key": f"k{n}"}) for n in (1, 2)
+    ]
+    writers[0].finish("done", None, None, STARTED)
+    writers[1].close()
+    house.hear(DevicesKnown(GOOD, {}, house.store.sessions()))
+    fault = house.conductor.standing.fault
+    assert fault is not None
+    assert (fault["cause"], house.store.load_state()["fault"]) == ("interrupted", fault)
+    assert house.store.unfinished() == []
+    known = house.sessions.with_key("k1")
+    assert known is not None
+    assert known.id == writers[0].id

@@ -11,7 +11,8 @@ import pytest
 from legato.drivers.sim.clock import ManualClock
 from legato.hal.camera import Camera
 from legato.hal.faults import Cause, DeviceError
-from tests.contract import test_arms as arms
+from tests.contract import arms
+from tests.contract import test_arms as promises
 from tests.contract import test_cameras as cameras
 from tests.printed import DOCS, blocks
 
@@ -71,10 +72,10 @@ def test_the_printed_camera_gives_the_newest_picture(tmp_path: Path, camera: Cam
 @pytest.mark.parametrize(
     "promise",
     [
-        arms.test_nothing_works_before_open_and_after_close,
-        arms.test_open_and_close_are_idempotent_and_move_nothing,
-        arms.test_a_step_returns_the_reading_after_the_motion,
-        arms.test_a_step_of_nothing_is_harmless,
+        promises.test_nothing_works_before_open_and_after_close,
+        promises.test_open_and_close_are_idempotent_and_move_nothing,
+        promises.test_a_step_returns_the_reading_after_the_motion,
+        promises.test_a_step_of_nothing_is_harmless,
     ],
 )
 def test_the_printed_arm_keeps_an_arms_promises(promise: Any, bench: arms.Bench) -> None:

@@ -7,11 +7,19 @@ import pytest
 from legato.records.record import SessionRecord, read_session
 from tests.unit.report.sessions import begun, whole_session
 
+PACE = 20.0
+
 
 @pytest.fixture(scope="session")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
     """Return the record of a whole session that ended as done."""
     return read_session(whole_session(tmp_path_factory.mktemp("exported")))
+
+
+@pytest.fixture(scope="session")
+def hasty(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
+    """Return the same session of a cell whose clock ran PACE times as fast as the wall's."""
+    return read_session(whole_session(tmp_path_factory.mktemp("hasty"), PACE))
 
 
 @pytest.fixture

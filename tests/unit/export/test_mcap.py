@@ -9,11 +9,12 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from legato.export.clock import NANO, time_line
+from legato.export.clock import NANO, nanoseconds, time_line
 from legato.export.mcap import write_mcap
 from legato.geometry.arm import ArmModel, forward
 from legato.records.record import SessionRecord
 from legato.report.scene import scene_of
+from tests.unit.export.conftest import PACE
 
 Message = tuple[str, int, Any]  # topic, when in ns, what
 
@@ -82,7 +83,7 @@ def test_schemas_are_foxgloves_and_every_channel_has_one(file: tuple[Any, list[M
     assert names == {
         "foxglove.CameraCalibration", "foxglove.CompressedImage", "foxglove.FrameTransforms",
         "foxglove.ImageAnnotations", "foxglove.JointStates", "foxglove.Log",
-        "foxglove.PoseInFrame", "foxglove.SceneUpdate", "legato.Event",
+        "foxglove.PoseInFrame", "foxglove.SceneUpdate", "legato.Clock", "legato.Event",
     }  # fmt: skip
     assert all(c.schema_id in summary.schemas for c in summary.channels.values())
     attached = {index.name for index in summary.attachment_indexes}
@@ -90,16 +91,23 @@ def test_schemas_are_foxgloves_and_every_channel_has_one(file: tuple[Any, list[M
     assert [index.name for index in summary.metadata_indexes] == ["session"]
 
 
-def test_messages_stand_in_the_order_of_time_by_the_cells_clock(
-    whole: SessionRecord, messages: list[Message]
+def test_messages_stand_in_the_order_of_time_by_the_walls_clock(
+    hasty: SessionRecord,
 ) -> None:
-    """Time runs from the first event's wall time at the pace of the cell."""
+    """Each stands at the time of day of its event; the cell's clock is told beside every row."""
+    _, messages = played(hasty)
     moments = [moment for _, moment, _ in messages]
     assert moments == sorted(moments)
-    line, last = time_line(whole), float(whole.trajectory["t"][-1])
-    seconds = last - float(whole.events[0]["t"])
-    assert line.at(last) - line.zero_ns == pytest.approx(seconds * NANO, abs=2)
-    assert line.at(last) in moments
+    events = [(moment, e) for name, moment, e in messages if name.startswith("/record/")]
+    assert all(moment == nanoseconds(e["wall"]) for moment, e in events)
+    line = time_line(hasty)
+    clocks = [(moment, said) for name, moment, said in messages if name == "/cell/clock"]
+    assert [said["cell_s"] for _, said in clocks] == list(hasty.trajectory["t"])
+    assert all(said["pace"] == PACE for _, said in clocks)
+    assert [moment for moment, _ in clocks] == [line.at(t) for t in hasty.trajectory["t"]]
+    began, ended = (nanoseconds(hasty.events[i]["wall"]) for i in (0, -1))
+    rounded = NANO // 1000  # the trajectory's times are
+    assert all(began <= moment <= ended + rounded for moment, _ in clocks)
 
 
 def test_the_links_put_the_fingertip_where_the_record_has_it(

@@ -8,20 +8,56 @@ from pathlib import Path
 import pytest
 from pyarrow import parquet
 
-from legato.export.clock import nanoseconds
+from legato.export.clock import NANO, nanoseconds, time_line
 from legato.export.tables import NeedsLibrary, tables, write_csv, write_parquet
 from legato.records.record import SessionRecord
+from tests.unit.export.conftest import PACE
 
 
 def test_tables_hold_the_record(whole: SessionRecord) -> None:
     """A row for each motion, event and contact; events keep their data whole."""
     found = tables(whole)
-    assert len(found["trajectory"]["t"]) == whole.trajectory["t"].size
+    assert found["trajectory"]["cell_s"] == whole.trajectory["t"].tolist()
     assert [json.loads(d) for d in found["events"]["data"]] == [e["data"] for e in whole.events]
     contacts = [e["data"] for e in whole.of_kind("contact")]
     assert found["contacts"]["contact_mm"] == [c["contact_mm"] for c in contacts]
     assert found["contacts"]["touched_z_mm"] == [c["xyz_mm"][2] for c in contacts]
     assert found["contacts"]["sigma_mm"][0] == pytest.approx(0.08 + 7.0 / 2000.0)
+
+
+def test_wall_times_are_the_walls_and_the_cells_clock_stands_beside(
+    hasty: SessionRecord,
+) -> None:
+    """At whatever pace the cell's clock runs, an event's wall_ns is its own wall time; cell_s is t.
+
+    A row between two events lies between them by both clocks.
+    """
+    found = tables(hasty)
+    events, moves, touched = (found[n] for n in ("events", "trajectory", "contacts"))
+    assert events["wall_ns"] == [nanoseconds(e["wall"]) for e in hasty.events]
+    assert events["cell_s"] == [e["t"] for e in hasty.events]
+    contacts = hasty.of_kind("contact")
+    assert touched["wall_ns"] == [nanoseconds(e["wall"]) for e in contacts]
+    assert touched["cell_s"] == [e["t"] for e in contacts]
+    wall_s = (moves["wall_ns"][-1] - moves["wall_ns"][0]) / NANO
+    cell_s = moves["cell_s"][-1] - moves["cell_s"][0]
+    assert wall_s * PACE == pytest.approx(cell_s, rel=1e-4)
+    assert events["wall_ns"][0] < moves["wall_ns"][0] < moves["wall_ns"][-1]
+    assert moves["wall_ns"][-1] <= events["wall_ns"][-1] + NANO // 1000  # its times are rounded
+
+
+def test_beyond_the_events_the_cells_clock_counts_at_its_pace(hasty: SessionRecord) -> None:
+    """Before the first and after the last event; where the wall's clock was set back, it was.
+
+    An event whose wall time cannot be read is passed over.
+    """
+    walls = {10.0: "00:01:00", 20.0: "gone", 30.0: "00:01:01", 50.0: "00:00:59"}
+    events = [{"t": t, "wall": f"1970-01-01T{wall}"} for t, wall in walls.items()]
+    line = time_line(SessionRecord(hasty.path, hasty.meta, events, torn=False))
+    seconds = (-10.0, 10.0, 20.0, 30.0, 40.0, 50.0, 90.0)
+    assert [line.at(s) / NANO for s in seconds] == [59.0, 60.0, 60.5, 61.0, 60.0, 59.0, 61.0]
+    bare = SessionRecord(hasty.path, {"started": "1970-01-01T00:00:05"}, events[1:2], torn=False)
+    assert [time_line(bare).at(s) / NANO for s in (20.0, 22.0)] == [5.0, 7.0]
 
 
 def test_csv_and_parquet_agree(whole: SessionRecord, tmp_path: Path) -> None:

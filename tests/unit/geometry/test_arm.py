@@ -147,6 +147,14 @@ def test_reach_refuses_with_the_place_and_the_reason() -> None:
         reach(narrow, [200, 100, 50], -np.pi / 2, 0.0)
 
 
+def test_room_to_spare_is_named_as_the_limit_it_makes() -> None:
+    """What is within its limits but too near an end is told the range that was left."""
+    joints = [MODEL.limits.base[1] - 0.001, 0.0, 0.0, 0.0, 0.0]
+    assert not any("base" in text for text in broken_limits(MODEL, joints))
+    (said,) = (t for t in broken_limits(MODEL, joints, np.radians(-0.3)) if "base" in t)
+    assert said == "base 89.94 deg is outside -89.70 to 89.70 deg, 0.3 deg within its ends"
+
+
 def test_the_published_start_pose_is_within_every_limit() -> None:
     """The paper's start pose is reachable."""
     assert not broken_limits(MODEL, reach(MODEL, [127, 0, 0], -np.pi / 2, 0.0))

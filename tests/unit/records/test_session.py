@@ -106,6 +106,7 @@ def test_a_linked_document_is_not_followed(begin: Begin, tmp_path: Path) -> None
     secret = tmp_path / "secret.json"
     secret.write_text('{"key": 1}')
     (writer.path / "truth.json").symlink_to(secret)
+    (writer.path / "frames").mkdir()
     (writer.path / "frames" / "x.png").symlink_to(secret)
     record = read_session(writer.path)
     assert record.truth is None

@@ -5,6 +5,7 @@ The estimate and the truth differ by a known turn and shift; everything else fol
 
 import io
 from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -40,8 +41,10 @@ from legato.records.trajectory import trajectory_row
 LEG, ARM = Leg(), ArmModel()
 CAMERA = Intrinsics(652.0, 655.0, 346.0, 279.0, -0.02)
 STATIONS = (7.0, 67.0, 127.0, 187.0)
-WALL = "2026-11-22T01:47:{:09.6f}+00:00"
+BEGAN = datetime(2026, 11, 22, 1, 47, tzinfo=UTC)
 CONFIG: dict[str, Any] = {
+    "robot": {"driver": "sim"},
+    "camera": {"driver": "sim"},
     "leg": {"stations_mm": list(STATIONS), "approach_mm": 10.0},
     "massage": {"strokes": 3, "press_mm": 1.5, "contact_window_mm": 2.0},
     "cell": {"table_z_mm": 0.0, "workspace": {"x_mm": [40.0, 330.0]}},
@@ -65,13 +68,17 @@ class Cell:
     true: Array = field(default_factory=lambda: pose((0.2, -0.1, 0.15), 0.1))
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(1))
     t: float = 100.0
+    pace: float = 1.0
     tip: ToolPose = field(default_factory=lambda: ToolPose(127.0, 0.0, 150.0))
     touches: list[dict[str, Any]] = field(default_factory=list)
 
     def event(self, kind: str, **data: Any) -> None:
         """Record an event now."""
-        wall = WALL.format((self.t - 100.0) % 60.0)
-        self.writer.event(kind, data, t=self.t, wall=wall)
+        self.writer.event(kind, data, t=self.t, wall=self.wall())
+
+    def wall(self) -> str:
+        """Return the time of day: `pace` of the cell's seconds pass in one of the wall's."""
+        return (BEGAN + timedelta(seconds=(self.t - 100.0) / self.pace)).isoformat()
 
     def enter(self, state: str, previous: str, seconds: float = 0.4) -> None:
         """Record a change of state and stay."""
@@ -229,19 +236,20 @@ def calibration(
     }  # fmt: skip
 
 
-def begun(state_dir: Path, job: str = "run") -> Cell:
-    """Begin a session of a simulated cell in a fresh store."""
+def begun(state_dir: Path, job: str = "run", pace: float = 1.0) -> Cell:
+    """Begin a session of a simulated cell in a fresh store, its clock `pace` times the wall's."""
+    config = {**CONFIG, "sim": {**CONFIG["sim"], "time_scale": pace}}
     meta = {
-        "job": job, "params": {"seed": 1}, "key": None, "started": WALL.format(0.0),
+        "job": job, "params": {"seed": 1}, "key": None, "started": BEGAN.isoformat(),
         "simulated": True, "versions": {"legato": "0.1.0", "numpy": "2.4.6"}, "boot": "b00t",
-        "config_hash": "c0ffee", "config": CONFIG,
+        "config_hash": "c0ffee", "config": config,
     }  # fmt: skip
-    return Cell(Store(state_dir, token=lambda: "5f3a").begin(meta))
+    return Cell(Store(state_dir, token=lambda: "5f3a").begin(meta), pace=pace)
 
 
-def whole_session(state_dir: Path) -> Path:
+def whole_session(state_dir: Path, pace: float = 1.0) -> Path:
     """Write a whole session that ends as done, and return its folder."""
-    cell = begun(state_dir)
+    cell = begun(state_dir, pace=pace)
     cell.enter("capture", "idle")
     cell.look()
     cell.enter("calibrate", "capture", 0.9)
@@ -259,5 +267,5 @@ def whole_session(state_dir: Path) -> Path:
     cell.enter("idle", "move_home", 0.0)
     cell.testify()
     cell.event("session", id=cell.writer.id, job="run", outcome="done", reason=None)
-    cell.writer.finish("done", None, None, "2026-11-22T01:47:42+00:00")
+    cell.writer.finish("done", None, None, cell.wall())
     return cell.writer.path

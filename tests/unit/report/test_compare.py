@@ -1,5 +1,7 @@
 """Sessions side by side: spreads that are known beforehand, pages for few and for many."""
 
+import base64
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -9,8 +11,9 @@ import pytest
 
 from legato.geometry.transforms import rotation_from_vector, transform
 from legato.records.record import SessionRecord, read_session
-from legato.report.campaign import SIDE_BY_SIDE, write_comparison
+from legato.report.campaign import SIDE_BY_SIDE, apart, write_comparison
 from legato.report.compare import MIDDLE, compare
+from legato.report.figures import campaign
 from tests.unit.report.sessions import STATIONS, begun
 
 
@@ -108,6 +111,53 @@ def test_the_page_of_two_has_columns_and_figures(
     for record in twice:
         assert f"<td>{record.id}</td>" in page
     assert "http" not in page
+
+
+def shown(uri: str | None) -> str:
+    """Return a figure's SVG; its words are outlines, and stand in comments."""
+    assert uri is not None
+    return base64.b64decode(uri.partition(",")[2]).decode()
+
+
+def test_every_state_is_drawn_where_it_came_and_named(
+    twice: tuple[SessionRecord, SessionRecord],
+) -> None:
+    """Each has a name and a colour of its own; one that was come to twice is two bars."""
+    found = compare(twice)
+    svg = shown(campaign.durations(found))
+    names = dict.fromkeys(stay.state for stay in found.sides[0].course if stay.state != "idle")
+    assert {f"massage_{s:g}" for s in STATIONS} < set(names)
+    for name in names:
+        assert f"<!-- {name} -->" in svg
+    bars = {re.search(r"fill: (#\w+)", bar[0])[1]  # type: ignore[index]
+            for bar in re.finditer(r"<path[^>]*stroke: #ffffff[^>]*>", svg)}  # fmt: skip
+    assert len(bars) == len(names)
+    homes = [stay for stay in found.sides[0].course if stay.state == "move_home"]
+    assert len(homes) == 2
+    assert found.sides[0].stays["move_home"] == pytest.approx(sum(s.seconds for s in homes))
+
+
+def test_each_station_has_a_panel_in_which_its_spread_is_seen(
+    twice: tuple[SessionRecord, SessionRecord],
+) -> None:
+    """The panels name their stations; line, band and strokes are told in the legend."""
+    for event in twice[1].events:
+        if event["kind"] == "contact":
+            event["data"]["contact_mm"] += 0.001
+    svg = shown(campaign.contacts(compare(twice)))
+    for station in STATIONS:
+        assert f"<!-- {station:g} mm -->" in svg
+    for words in ("stroke", "mean of the sessions", "± their standard deviation"):
+        assert f"<!-- {words} -->" in svg
+
+
+def test_what_is_the_same_in_all_is_said_once() -> None:
+    """Figures that do not differ leave the table; those that do keep their order."""
+    rows = [[("job", "run"), ("outcome", "done"), ("cell", "real")],
+            [("job", "run"), ("outcome", "fault"), ("cell", "real")]]  # fmt: skip
+    differing, alike = apart(rows)
+    assert differing == [[("outcome", "done")], [("outcome", "fault")]]
+    assert alike == [("job", "run"), ("cell", "real")]
 
 
 def test_the_page_of_many_has_rows_and_takes_sessions_that_came_to_nothing(

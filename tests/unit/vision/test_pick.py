@@ -120,12 +120,14 @@ def test_picks_are_snapped_and_refined(plain: Any) -> None:
 
 
 def test_a_pick_without_a_mark_is_missing(plain: Any) -> None:
-    """A pick on bare wood, and a second pick of one mark, are missing with their reasons."""
+    """A pick on bare wood, a second of one mark, and one beyond all sense are missing, with why."""
     picks = {n: tuple(plain.truth(n)) for n in ("P1", "P2", "P5", "P6", "P8")}
     picks["P3"] = tuple((plain.truth("P3") + plain.truth("P6")) / 2.0)
     picks["P7"] = tuple(plain.truth("P6") + np.array([3.0, 0.0]))
+    picks["P9"] = (-1e300, 1e300)
     picking = snap_picks(plain.image, plain.leg, plain.view.intrinsics, picks)
     assert picking.missing["P3"].startswith("no mark within")
+    assert picking.missing["P9"].startswith("no mark within")
     assert "P6" in picking.missing["P7"]
     assert set(picking.marks) == {"P1", "P2", "P5", "P6", "P8"}
 

@@ -8,13 +8,17 @@ import pytest
 from legato.geometry.arm import ArmModel, backward, forward, skeleton
 from legato.web.board import LINES, Board
 from legato.web.pose import posed
+from legato.web.present import Contacts
 
 ARM = {"connected": True, "referenced": True, "xyz_mm": [127.0, 0.0, 150.0], "pitch_deg": -90.0,
        "roll_deg": 0.0, "contact": False}  # fmt: skip
 STATUS: dict[str, Any] = {
     "boot": "b1", "state": "idle", "session": None, "progress": None, "arm": ARM, "fault": None,
-    "simulated": True,
+    "simulated": True, "camera": {"connected": True, "age_s": None}, "calibration": None,
 }  # fmt: skip
+BANDS = [{"station_mm": 7.0, "sigma_mm": 0.1, "expected_mm": 0.2, "accepted_mm": 2.0}]
+TOUCH = {"station_mm": 7.0, "stroke": 1, "contact_mm": 0.1}
+RUNNING = {**STATUS, "state": "massage_7", "session": "s1"}
 FAULT = {"cause": "estop", "text": "t", "hint": "h", "since": "1", "session": "s1"}
 
 
@@ -52,7 +56,9 @@ def test_the_line_is_down_until_the_daemon_has_spoken(wall: Wall) -> None:
     board.status(STATUS, "0")
     assert wall["line"] == {"up": True, "since": "0", "boot": "b1"}
     board.lost("gone", "start it", "7")
-    assert (wall["line"]["up"], wall["line"]["since"]) == (False, "7")
+    assert (wall["line"]["up"], wall["line"]["since"], wall["line"]["stop"]) == (False, "7", None)
+    board.lost("gone", "start it", "7", stop=False)
+    assert wall["line"]["stop"] is False
 
 
 def test_the_graph_and_its_answers_come_from_describe(board: Board, wall: Wall) -> None:
@@ -77,18 +83,17 @@ def test_contacts_come_once_and_begin_anew_with_each_massage(board: Board, wall:
     board.take("session", event(1, id="s1", job="run", outcome=None), "0")
     board.take("contact", event(2, **second), "0")
     board.take("contact", event(2, **second), "0")
-    board.recorded("s1", [first, second])
+    board.looked(None, None, Contacts("s1", "s1", BANDS, [first, second]))
     assert [c["stroke"] for c in wall["contacts"]["rows"]] == [1, 2]
-    board.recorded("older", [first])
+    board.looked(None, None, Contacts("older", "older", None, [first]))
     assert wall["contacts"]["session"] == "s1"
     board.take("session", event(9, id="s2", job="massage", outcome=None), "0")
-    assert wall["contacts"] == {"session": "s2", "rows": []}
+    assert (wall["contacts"]["session"], wall["contacts"]["rows"]) == ("s2", [])
 
 
 def test_a_job_that_touches_nothing_leaves_the_contacts(board: Board, wall: Wall) -> None:
     """A capture afterwards does not wipe the last massage off the page."""
-    contact = {"station_mm": 7.0, "stroke": 1, "contact_mm": 0.1}
-    board.take("contact", event(2, **contact), "0")
+    board.take("contact", event(2, **TOUCH), "0")
     board.take("session", event(3, id="s2", job="capture", outcome=None), "0")
     assert len(wall["contacts"]["rows"]) == 1
 
@@ -114,6 +119,20 @@ def test_progress_of_a_session_that_has_ended_is_not_shown(board: Board, wall: W
     assert wall["progress"]["done"] == 2
 
 
+def test_what_is_done_is_told_only_in_the_state_it_is_done_in(board: Board, wall: Wall) -> None:
+    """On the way home no press is told any more, whoever says it again; how far it is stays."""
+    press = {"text": "press 3 at 7 mm", "station_mm": 7.0, "done": 3, "total": 12}
+    board.status({**RUNNING, "progress": press}, "0")
+    assert wall["progress"]["text"] == "press 3 at 7 mm"
+    board.take("state", event(4, state="move_home", previous="massage_7", cause="run"), "0")
+    assert (wall["progress"]["text"], wall["progress"]["done"]) == (None, 3)
+    board.status({**RUNNING, "state": "move_home", "progress": press}, "0")
+    assert wall["progress"]["text"] is None
+    again = {"text": "no picture, camera_lost: try 2", "station_mm": None}
+    board.status({**RUNNING, "state": "capture", "progress": again}, "0")
+    assert wall["progress"]["text"] == again["text"]
+
+
 def test_the_list_of_events_is_bounded_and_holds_each_once(board: Board, wall: Wall) -> None:
     """Telemetry is no line; a thousand states leave as many lines as are kept."""
     for seq in [*range(1, 1000), *range(990, 1000)]:
@@ -129,6 +148,16 @@ def test_another_boot_forgets_what_the_last_has_said(board: Board, wall: Wall) -
     board.status({**STATUS, "boot": "b2"}, "5")
     assert (wall["fault"], wall["session"]) == (None, None)
     assert wall["line"]["boot"] == "b2"
+
+
+def test_times_of_day_are_the_walls(wall: Wall) -> None:
+    """An age in a simulated cell's faster seconds becomes a time that stands still."""
+    board = Board(ArmModel(), wall.publish, time_scale=20.0)
+    for second, age in ((30, 100.0), (31, 121.0)):
+        told = {**STATUS, "camera": {"connected": True, "age_s": age}}
+        board.status(told, f"2026-11-22T08:00:{second}+00:00")
+        when = wall["status"]["when"]
+        assert when == {"picture": "2026-11-22T08:00:25+00:00", "calibration": None}
 
 
 def test_the_arm_stands_on_the_page_as_our_kinematics_have_it() -> None:

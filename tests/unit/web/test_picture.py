@@ -58,6 +58,8 @@ def test_a_session_without_pictures_has_no_view(whole: SessionRecord) -> None:
     blind = SessionRecord(whole.path, whole.meta, whole.events, whole.torn)
     blind.__dict__["frames"] = []
     assert picture_name(blind) is None
+    blind.__dict__["frames"] = [whole.path / "frames" / "start-calibrated.png"]  # for replays
+    assert picture_name(blind) is None
     assert view_of(blind) is None
 
 
@@ -85,9 +87,11 @@ def test_the_shelf_finds_picture_contacts_and_leg_of_the_newest(whole: SessionRe
     """And hands out no file that is not a session's picture."""
     shelf = Shelf(whole.path.parents[1])
     found = shelf.look()
-    picture, (session, rows) = found["picture"], found["contacts"]
-    assert picture["session"] == found["solved"]["session"] == session == whole.id
-    assert len(rows) == len(whole.of_kind("contact"))
+    picture, solved, touched = found["picture"], found["solved"], found["touched"]
+    assert picture["session"] == solved["session"] == touched.session == whole.id
+    assert solved["by"] == touched.by == whole.id
+    assert (picture["boot"], len(touched.bands)) == (whole.meta.get("boot"), 4)
+    assert len(touched.rows) == len(whole.of_kind("contact"))
     assert shelf.look() == found
     assert shelf.frame(whole.id, whole.frames[0].name).startswith(b"\x89PNG")
     for name in ("../session.json", "session.json", "..", ""):
@@ -99,7 +103,7 @@ def test_an_empty_state_folder_shows_nothing(tmp_path: Path) -> None:
     """A cell that has never worked, or whose folder is not there."""
     for folder in (tmp_path, tmp_path / "missing"):
         shelf = Shelf(folder)
-        assert shelf.look() == {"picture": None, "solved": None, "contacts": None}
+        assert shelf.look() == {"picture": None, "solved": None, "touched": None}
 
 
 def test_a_running_sessions_picture_is_seen_as_soon_as_it_is_there(tmp_path: Path) -> None:

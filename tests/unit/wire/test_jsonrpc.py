@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 
 import pytest
 from hypothesis import given, settings
@@ -101,6 +103,19 @@ def test_an_error_keeps_the_id_where_it_can_be_read() -> None:
     junk = received(message(id=9, method=None))
     assert isinstance(junk, Malformed)
     assert junk.id == 9
+
+
+@pytest.mark.parametrize(
+    ("head", "found"),
+    [(b'{"id": 7, "x": "', 7), (b'{"id": {}, "x": "', None), (b'{"id": true, "x": "', None),
+     (b'["', None), (b"\xff", None), (b"[" * 3000, None), (b'{"id": "' + b"i" * 300 + b'"', None)],
+)  # fmt: skip
+def test_of_what_is_too_long_only_the_id_is_read(head: bytes, found: object) -> None:
+    """Its sender can match the error, which names the limit."""
+    junk = received(head + b"y" * MAX_BYTES + b'"}')
+    assert isinstance(junk, Malformed)
+    assert junk.id == found
+    assert f"at most {MAX_BYTES}" in junk.failure.reason
 
 
 @pytest.mark.parametrize("rest", [[], [b"a", b"b"], [b"", b"a", b"b"], [b"", b"", b""]])
@@ -209,3 +224,30 @@ def test_every_method_is_described_with_its_schema() -> None:
     assert set(methods) == set(REQUESTS)
     assert all(m["does"].endswith(".") for m in methods.values())
     json.dumps(methods)
+
+
+def test_threads_may_be_the_first_to_use_a_request_together() -> None:
+    """Loop and stop line read requests at once; fresh processes that do so do not crash."""
+    program = """
+import sys, threading
+sys.setswitchinterval(1e-6)
+from legato.wire.jsonrpc import Call, Failure, decode_params
+from legato.wire.requests import REQUESTS
+
+def first(together, method):
+    together.wait()
+    try:
+        decode_params(Call((), method, {"key": "a", "picks": {"P1": [1.0, 2.0]}}))
+    except Failure:
+        pass
+
+for method in REQUESTS:
+    together = threading.Barrier(4)
+    threads = [threading.Thread(target=first, args=(together, method)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+"""
+    for _ in range(3):
+        subprocess.run([sys.executable, "-c", program], check=True, timeout=60.0)

@@ -19,29 +19,27 @@ class Kind(StrEnum):
     """What can go wrong."""
 
     SILENCE = "silence"
+    """The command is carried out, and its reply never comes."""
     LATE = "late"
+    """The reply comes BY seconds late (default 5)."""
     GARBAGE = "garbage"
+    """The reply's bytes are replaced by others."""
     REFUSED = "0"
+    """The command is answered 0 and not carried out."""
     PENDANT = "2"
+    """STOP is pressed during the command: it is broken off and answered 2."""
     HANG_UP = "hang-up"
+    """The line hangs up, and is back BY seconds later (default never)."""
     RESTART = "restart"
+    """The arm is switched off and on before the command: its registers are zero."""
     LOST_STEPS = "lost-steps"
+    """MOTOR (default 2) misses its next BY half-steps (default 60)."""
     STUCK_OPEN = "stuck-open"
+    """The grip switch reads open from then on."""
     STUCK_CLOSED = "stuck-closed"
+    """The grip switch reads closed from then on."""
 
 
-MEANINGS = {
-    Kind.SILENCE: "the command is carried out, and its reply never comes",
-    Kind.LATE: "the reply comes BY seconds late (default 5)",
-    Kind.GARBAGE: "the reply's bytes are replaced by others",
-    Kind.REFUSED: "the command is answered 0 and not carried out",
-    Kind.PENDANT: "STOP is pressed during the command: it is broken off and answered 2",
-    Kind.HANG_UP: "the line hangs up, and is back BY seconds later (default never)",
-    Kind.RESTART: "the arm is switched off and on before the command: its registers are zero",
-    Kind.LOST_STEPS: "MOTOR (default 2) misses its next BY half-steps (default 60)",
-    Kind.STUCK_OPEN: "the grip switch reads open from then on",
-    Kind.STUCK_CLOSED: "the grip switch reads closed from then on",
-}
 BY = {Kind.LATE: 5.0, Kind.LOST_STEPS: 60.0}
 COMMANDS: dict[str, type] = {"step": Step, "read": Read, "any": object}
 
@@ -69,13 +67,15 @@ def fault(text: str) -> Fault:
     if name not in list(Kind):
         raise ValueError(f"no fault {name!r}: there are {', '.join(Kind)}")
     kind = Kind(name)
-    given: dict[str, Any] = {"by": BY.get(kind)}
+    given: dict[str, Any] = {}
     for part in filter(None, rest.split(",")):
         key, _, value = part.partition("=")
+        if key in given:
+            raise ValueError(f"{text}: {key} stands twice")
         given[key] = _value(key, value)
     if sum(key in given for key in ("after", "at", "p")) > 1:
         raise ValueError(f"{text}: one of after, at and p")
-    return Fault(kind, **given)
+    return Fault(kind, **{"by": BY.get(kind)} | given)
 
 
 def _value(key: str, text: str) -> int | float | str:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from legato.report.compare import Comparison
+from legato.report.compare import Comparison, Station
 from legato.report.figures.canvas import (
     BLUE,
     GREEN,
@@ -15,7 +15,6 @@ from legato.report.figures.canvas import (
     RED,
     SMALL,
     SOFT,
-    VIOLET,
     dressed,
     sheet,
     svg,
@@ -24,43 +23,59 @@ from legato.report.figures.curves import state_colour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.patches import Patch
 
-COLOURS = (BLUE, ORANGE, GREEN, VIOLET, RED, "#3aa6b9", "#8c6d31", SOFT)
+ACROSS = 4  # panels beside each other
+IN_A_ROW = 7  # names of a legend
+IDLE = "idle"
+SPREAD = "\N{PLUS-MINUS SIGN} their standard deviation"
 AXIS_COLOURS = dict(zip("xyz", (RED, GREEN, BLUE), strict=True))
 
 
 def contacts(found: Comparison) -> str | None:
-    """Return every stroke's contact by station, a colour for each session, with mean and sd."""
+    """Return every stroke's contact by session, a panel for each station, with mean and sd.
+
+    Each panel has a scale of its own: sessions differ by far less than stations do.
+    """
     if not found.stations:
         return None
-    figure = sheet(3.1, left=0.85, top=0.4)
-    axes = figure.subplots()
-    axes.axhline(0.0, color=SOFT, linewidth=1.0)
-    count = len(found.sides)
-    for place, station in enumerate(found.stations):
-        for side, own in zip(found.sides, station.contacts, strict=True):
-            offset = 0.7 * ((side.number - 0.5) / count - 0.5)
-            axes.plot(
-                np.full(len(own), place + offset), own, "o", color=_colour(side.number),
-                markersize=4.5, markeredgecolor="white", markeredgewidth=0.5,
-                label=f"session {side.number}" if place == 0 and count <= len(COLOURS) else None,
-            )  # fmt: skip
-        if station.mean is not None:
-            spread = station.between or 0.0
-            axes.fill_between(
-                [place - 0.4, place + 0.4], station.mean - spread, station.mean + spread,
-                color=SOFT, alpha=0.18, lw=0,
-                label="mean ± sd of sessions" if place == 0 else None,
-            )  # fmt: skip
-            axes.plot([place - 0.4, place + 0.4], [station.mean] * 2, color=INK, linewidth=0.9)
-    axes.set_xticks(range(len(found.stations)), [f"{s.station_mm:g} mm" for s in found.stations])
-    axes.set_xlim(-0.6, len(found.stations) - 0.4)
-    dressed(axes, x="station", y="height over the\npredicted surface (mm)", grid="y")
-    axes.legend(
-        fontsize=SMALL, frameon=False, loc="lower left", ncols=6, bbox_to_anchor=(0, 1.0),
-        borderaxespad=0.0, columnspacing=1.2, handletextpad=0.4,
+    rows = -(-len(found.stations) // ACROSS)
+    figure = sheet(2.5 * rows + 0.35, left=1.0, top=0.6)
+    panels = figure.subplots(rows, ACROSS, squeeze=False).ravel()
+    figure.subplots_adjust(wspace=0.62, hspace=0.5)
+    words = {name: name for name in ("stroke", "mean of the sessions", SPREAD)}  # each told once
+    for axes, station in zip(panels, found.stations, strict=False):
+        _station(axes, station, words)
+        _by_session(axes, [side.number for side in found.sides])
+        axes.set_xlim(0.4, len(found.sides) + 0.6)
+        axes.ticklabel_format(axis="y", useOffset=False)
+        dressed(axes, x="session", title=f"{station.station_mm:g} mm", grid="y")
+    for axes in panels[len(found.stations) :]:
+        axes.set_visible(False)
+    panels[0].set_ylabel("height over the\npredicted surface (mm)", fontsize=NORMAL, color=INK)
+    drawn = [axes.get_legend_handles_labels() for axes in panels]
+    handles = [handle for own, _ in drawn for handle in own]
+    labels = [label for _, own in drawn for label in own]
+    figure.legend(
+        handles[::-1], labels[::-1],
+        fontsize=SMALL, frameon=False, loc="upper left", ncols=3, bbox_to_anchor=(0.1, 1.0),
+        borderaxespad=0.1,
     )  # fmt: skip
     return svg(figure)
+
+
+def _station(axes: "Axes", station: Station, words: dict[str, str]) -> None:
+    """Draw one station: strokes by session over the band of mean and standard deviation."""
+    if station.mean is not None and station.between is not None:
+        axes.axhspan(station.mean - station.between, station.mean + station.between,
+                     color=ORANGE, alpha=0.25, lw=0, label=words.pop(SPREAD, ""))  # fmt: skip
+    if station.mean is not None:
+        axes.axhline(station.mean, color=ORANGE, linewidth=1.0,
+                     label=words.pop("mean of the sessions", ""))  # fmt: skip
+    for number, own in enumerate(station.contacts, start=1):
+        places = number + 0.12 * (np.arange(len(own)) - (len(own) - 1) / 2)
+        axes.plot(places, own, "o", color=BLUE, markersize=4.5, markeredgecolor="white",
+                  markeredgewidth=0.5, label=words.pop("stroke", "") if own else "")  # fmt: skip
 
 
 def poses(found: Comparison) -> str | None:
@@ -73,17 +88,17 @@ def poses(found: Comparison) -> str | None:
     figure.subplots_adjust(wspace=0.22)
     numbers = [number for number, _ in known]
     for axes, values, unit, title in (
-        (panels[0], [p.shift_mm for _, p in known], "mm", "Shift of the leg's middle"),
-        (panels[1], [p.turn_deg for _, p in known], "deg", "Turn of the leg"),
+        (panels[0], [p.shift_mm for _, p in known], "mm", "Shift of the leg's middle along"),
+        (panels[1], [p.turn_deg for _, p in known], "deg", "Turn of the leg about"),
     ):
         axes.axhline(0.0, color=SOFT, linewidth=1.0)
         for axis, (name, colour) in enumerate(AXIS_COLOURS.items()):
-            label = f"along {name}" if unit == "mm" else f"about {name}"
             axes.plot(numbers, [v[axis] for v in values], "o-", color=colour, markersize=4,
-                      linewidth=0.9, label=label)  # fmt: skip
+                      linewidth=0.9, label=name)  # fmt: skip
         _by_session(axes, numbers)
         dressed(axes, x="session", y=f"from the mean ({unit})", title=title)
-        axes.legend(fontsize=SMALL, frameon=False, ncols=3, loc="best")
+        axes.legend(fontsize=SMALL, frameon=False, ncols=3, loc="lower right",
+                    bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)  # fmt: skip
     return svg(figure)
 
 
@@ -113,27 +128,48 @@ def quality(found: Comparison) -> str | None:
 
 
 def durations(found: Comparison) -> str | None:
-    """Return how long each session stayed in each state, s of the cell."""
-    names = list(dict.fromkeys(n for s in found.sides for n in s.stays if n != "idle"))
+    """Return each session's states as they came, s of the cell since it began."""
+    names = list(dict.fromkeys(c.state for s in found.sides for c in s.course if c.state != IDLE))
     if not names:
         return None
-    figure = sheet(0.95 + 0.24 * len(found.sides), left=0.6, right=1.5)
+    legend_rows = -(-len(names) // IN_A_ROW)
+    figure = sheet(
+        0.75 + 0.24 * len(found.sides) + 0.22 * legend_rows, left=0.6, top=0.1 + 0.22 * legend_rows
+    )
     axes = figure.subplots()
-    reached = np.zeros(len(found.sides))
-    rows = np.arange(len(found.sides))
-    shades: dict[str, int] = {}
-    for name in names:
-        seconds = np.array([s.stays.get(name, 0.0) for s in found.sides])
-        colour = state_colour(name)
-        shades[colour] = shades.get(colour, 0) + 1
-        axes.barh(rows, seconds, left=reached, height=0.65, color=colour, label=name,
-                  alpha=1.0 / (1.0 + 0.35 * (shades[colour] - 1)))  # fmt: skip
-        reached += seconds
-    axes.set_yticks(rows, [str(s.number) for s in found.sides])
+    colours = dict(zip(names, _shades(names), strict=True))
+    for row, side in enumerate(found.sides):
+        for stay in side.course:
+            if stay.state != IDLE:
+                axes.barh(row, stay.seconds, left=stay.began, height=0.65, edgecolor="white",
+                          linewidth=0.4, color=colours[stay.state])  # fmt: skip
+    axes.set_yticks(range(len(found.sides)), [str(s.number) for s in found.sides])
     axes.invert_yaxis()
-    dressed(axes, x="seconds of the cell", y="session", grid="x")
-    axes.legend(fontsize=SMALL, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axes.margins(x=0.01)
+    dressed(axes, x="seconds of the cell since the session began", y="session", grid="x")
+    figure.legend(
+        [_patch(colours[name]) for name in names], names, fontsize=SMALL, frameon=False,
+        loc="upper left", ncols=IN_A_ROW, bbox_to_anchor=(0.06, 1.0), borderaxespad=0.1,
+    )  # fmt: skip
     return svg(figure)
+
+
+def _shades(names: Sequence[str]) -> list[str]:
+    """Return a colour for each state; the stations, which share one, go from light to dark."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    shared = [n for n in names if state_colour(n) == ORANGE]
+    steps = np.linspace(0.35, 0.85, len(shared)) if len(shared) > 1 else [0.6]
+    own = {n: to_hex(colormaps["Oranges"](step)) for n, step in zip(shared, steps, strict=False)}
+    return [own.get(name, state_colour(name)) for name in names]
+
+
+def _patch(colour: str) -> "Patch":
+    """Return a colour's square for a legend."""
+    from matplotlib.patches import Patch
+
+    return Patch(color=colour)
 
 
 def _by_session(axes: "Axes", numbers: Sequence[int]) -> None:
@@ -141,8 +177,3 @@ def _by_session(axes: "Axes", numbers: Sequence[int]) -> None:
     step = max(1, -(-len(numbers) // 12))
     axes.set_xticks(list(numbers)[::step])
     axes.tick_params(labelsize=NORMAL)
-
-
-def _colour(number: int) -> str:
-    """Return a session's colour."""
-    return COLOURS[(number - 1) % len(COLOURS)]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from legato.control.band import ACCEPTED, EXPECTED, Band
 from legato.geometry.transforms import Array
 from legato.report.figures.canvas import (
     BLUE,
@@ -32,7 +33,7 @@ STATE_COLOURS = {
     "verify": GREEN,
     "move_home": SOFT,
     "paused": "#e3c34f",
-    "stopping": "#b5651d",
+    "stopping": "#3aa6b9",
     "fault": RED,
 }
 
@@ -76,33 +77,31 @@ def cost(
     return svg(figure)
 
 
-def contact_heights(
-    contacts: Sequence[Mapping[str, Any]], sigma: Mapping[float, float], window: float | None
-) -> str:
-    """Return touched heights over the predicted surface by station, beside what was expected.
-
-    `sigma` are the predicted standard deviations by station, `window` the limit either way, mm.
-    """
-    stations = list(dict.fromkeys([*sigma, *(float(c["station_mm"]) for c in contacts)]))
+def contact_heights(contacts: Sequence[Mapping[str, Any]], bands: Mapping[float, Band]) -> str:
+    """Return touched heights over the predicted surface, beside both bands of each station."""
+    stations = list(bands)
     figure = sheet(2.9, left=0.85, top=0.35)
     axes = figure.subplots()
     axes.axhline(0.0, color=SOFT, linewidth=1.0)
+    words = {name: name for name in (EXPECTED, ACCEPTED, "touched")}  # each is told once
     for place, station in enumerate(stations):
-        spread = sigma.get(station)
-        if spread:
+        band = bands[station]
+        if band.expected_mm:
             axes.fill_between(
-                [place - 0.3, place + 0.3], -2 * spread, 2 * spread, color=BLUE, alpha=0.16, lw=0,
-                label="predicted, ± 2 standard deviations" if place == 0 else None,
+                [place - 0.3, place + 0.3], -band.expected_mm, band.expected_mm, color=BLUE,
+                alpha=0.2, lw=0, label=words.pop(EXPECTED, None),
+            )  # fmt: skip
+        if band.accepted_mm:
+            axes.hlines(
+                [-band.accepted_mm, band.accepted_mm], place - 0.42, place + 0.42, color=ORANGE,
+                linewidth=1.2, linestyle="--", label=words.pop(ACCEPTED, ""),
             )  # fmt: skip
         own = [c for c in contacts if float(c["station_mm"]) == station]
         offsets = (np.arange(len(own)) - (len(own) - 1) / 2) * min(0.12, 0.5 / max(len(own), 1))
         axes.plot(
             place + offsets, [float(c["contact_mm"]) for c in own], "o", color=RED, markersize=5,
-            markeredgecolor="white", label="touched" if place == 0 else None,
+            markeredgecolor="white", label=words.pop("touched", None),
         )  # fmt: skip
-    if window:
-        axes.axhline(window, color=ORANGE, linewidth=1.0, linestyle="--", label="contact window")
-        axes.axhline(-window, color=ORANGE, linewidth=1.0, linestyle="--")
     axes.set_xticks(range(len(stations)), [f"{s:g} mm" for s in stations])
     axes.set_xlim(-0.6, len(stations) - 0.4)
     dressed(axes, x="station", y="height over the\npredicted surface (mm)", grid="y")
@@ -117,10 +116,13 @@ def contact_heights(
     return svg(figure)
 
 
-def press_profiles(profiles: Mapping[float, Sequence[tuple[Array, Array, Array]]]) -> str:
+def press_profiles(
+    profiles: Mapping[float, Sequence[tuple[Array, Array, Array]]], seconds: str = "s"
+) -> str:
     """Return the fingertip's height over the predicted surface in each stroke, by station.
 
-    `profiles` holds for each stroke its times (N,) in s, heights (N,) in mm and whys (N,).
+    `profiles` holds for each stroke its times (N,), heights (N,) in mm and whys (N,); `seconds`
+    says whose the times are.
     """
     figure = sheet(2.7, top=0.3, bottom=0.8)
     panels = figure.subplots(1, len(profiles), sharey=True, squeeze=False)[0]
@@ -133,7 +135,7 @@ def press_profiles(profiles: Mapping[float, Sequence[tuple[Array, Array, Array]]
                     label = why if axes is panels[0] else None
                     axes.plot(*piece.T, color=colour, linewidth=1.3, label=label)
         axes.axhline(0.0, color=SOFT, linewidth=1.0)
-        dressed(axes, x="s", title=f"{station:g} mm", grid="y")
+        dressed(axes, x=seconds, title=f"{station:g} mm", grid="y")
     panels[0].set_ylabel("height (mm)", fontsize=NORMAL, color=INK)
     handles, labels = panels[0].get_legend_handles_labels()
     unique = dict(zip(labels, handles, strict=True))

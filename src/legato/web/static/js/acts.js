@@ -1,9 +1,10 @@
 // What the person asks for: the token, what it allows, and every request with its answer.
 
 import { $, say } from "./dom.js";
-import { believed, known } from "./live.js";
+import { believed, known, on } from "./live.js";
 
 const KEY = "legato-token";
+const REFUSED_MS = 30000; // for so long a refusal is news
 const JOBS = ["run", "capture", "calibrate", "verify", "home", "massage"];
 
 let token = null;
@@ -45,18 +46,19 @@ export function against(method) {
   if (!believed()) return "There is no connection to the cell.";
   const row = known.table?.answers[known.state?.state]?.[method];
   if (!row) return "The daemon has not said what it allows.";
-  return row.answer === "accepted" ? null : `${row.reason}; ${row.hint}`;
+  const no = row.answer === "accepted" ? known.status?.lacking?.[method] : row;
+  return no ? `${no.reason}; ${no.hint}` : null;
 }
 
 // Asks, and tells the answer; a click twice gives one session.
 export async function act(method, params = {}) {
   const no = against(method);
-  if (no) return tell(`${method}: ${no}`, true);
+  if (no) return tell(refused(method, no), true);
   const once = JOBS.includes(method) ? { key: crypto.randomUUID() } : {};
   const answer = await send("POST", `/api/act/${method}`, { ...params, ...once });
   if (!answer.ok) {
     const { reason, hint } = answer.told ?? { reason: "the page's server does not answer" };
-    tell(`${method} was not carried out: ${reason}${hint ? `; ${hint}` : ""}`, true);
+    tell(refused(method, `${reason}${hint ? `; ${hint}` : ""}`), true);
   } else tell(carriedOut(method, answer.told));
   return answer.ok;
 }
@@ -71,11 +73,32 @@ function carriedOut(method, told) {
     : `${method} given, confirmed by the arm's driver after ${Math.max(spent, 0).toFixed(0)} ms`;
 }
 
+const refused = (method, why) => why.startsWith(`${method} `)
+  ? why[0].toUpperCase() + why.slice(1)
+  : `${method} was not carried out: ${why}`;
+
+let forgetting = null;
 function tell(text, urgent = false) {
+  forget();
   $("said").classList.toggle("no", urgent);
   say($("said"), text);
-  if (urgent) say($("urgent"), text);
+  if (!urgent) return;
+  say($("urgent"), text);
+  forgetting = setTimeout(forget, REFUSED_MS);
 }
+
+// A refusal is of its moment: it goes with the state or the line, the next act, or in time.
+function forget() {
+  clearTimeout(forgetting);
+  if (!$("said").classList.contains("no")) return;
+  if ($("urgent").textContent === $("said").textContent) say($("urgent"), "");
+  $("said").classList.remove("no");
+  say($("said"), "");
+}
+on("state line", () => {
+  forget();
+  if (!believed()) say($("said"), "");
+});
 
 async function send(method, path, body) {
   try {

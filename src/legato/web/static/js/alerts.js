@@ -1,9 +1,8 @@
 // What must not be overlooked: a lost line, a fault, a page that cannot act.
 
 import { act, against, mayAct, onRights } from "./acts.js";
-import { $, clock, day, fill, h, marked, say } from "./dom.js";
+import { $, clock, fill, h, marked, moment, say } from "./dom.js";
 import { known, on } from "./live.js";
-import { startMarking } from "./marking.js";
 
 const boxes = { line: h("div"), fault: h("div"), rights: h("div") };
 fill($("alerts"), Object.values(boxes));
@@ -21,37 +20,39 @@ on("line", () => {
     h("h2", {}, what[0]),
     h("p", {}, "All that is shown below is old",
       line === "lost" && since ? `: the last was heard at ${clock(since)}. ` : ". ",
-      "The cell may be moving. Use the hardware stop if in doubt."),
+      "The cell may be moving. Use the hardware stop if in doubt.",
+      line === "lost" && known.line.stop && " Its stop line still answers: Stop and E-stop reach it."),
     h("p", { class: "note" }, marked([what[1], what[2]].filter(Boolean).join("; ")))));
   if (what) urgent(`${what[0]}. What is shown is old.`);
-  else if (line === "up" && announced.startsWith("No connection")) urgent("Connected again.");
+  else if (line === "up" && announced.startsWith("No")) urgent("Connected again.");
 });
 
 on("fault state line", () => {
   const fault = known.state?.state === "fault" ? known.fault : null;
-  if (!fault) return fill(boxes.fault);
+  if (!fault) {
+    if (announced.startsWith("Fault")) urgent("");
+    return fill(boxes.fault);
+  }
   const evidence = Object.entries(fault.evidence ?? {}).filter(([, v]) => !empty(v));
-  const handle = (text, click, no) =>
-    h("button", { type: "button", class: text === "Reset" ? "plain first" : "plain", "aria-disabled": no !== null, title: no ?? "", onclick: click }, text);
   fill(boxes.fault, h("section", { class: "alert fault", "aria-labelledby": "h-fault" },
-    h("h2", { id: "h-fault" }, h("code", {}, fault.cause), " ", fault.text),
-    h("p", {}, h("strong", {}, "What to do: "), marked(fault.hint)),
-    h("p", { class: "note" }, `Since ${day(fault.since)}`,
+    h("h2", { id: "h-fault" }, h("code", {}, fault.cause), ": ", fault.text),
+    h("p", {}, h("strong", {}, "What to do: "), marked(fault.hint),
+      fault.cause === "marks_not_found" && mayAct() && ". Or reset, and mark by hand under the picture."),
+    h("p", { class: "note" }, "Since ", moment(fault.since),
       fault.session && [", in session ", report(fault.session)]),
     evidence.length > 0 && h("details", {},
       h("summary", {}, "Evidence"),
       h("dl", { class: "evidence" }, evidence.map(([name, value]) =>
         [h("dt", {}, name.replaceAll("_", " ")), h("dd", {}, plain(value))]))),
-    h("div", { class: "row" },
-      handle("Reset", () => act("reset"), against("reset")),
-      fault.cause === "marks_not_found" &&
-        handle("Mark by hand", startMarking, mayAct() ? null : against("calibrate")))));
+    document.body.dataset.line === "up" && h("div", { class: "row" }, reset(against("reset")))));
   urgent(`Fault ${fault.cause}: ${fault.text}. What to do: ${fault.hint}`);
 });
 
 onRights(() => {
   fill(boxes.rights, !mayAct() && h("p", { class: "alert quiet" }, against("run")));
 });
+
+const reset = (no) => h("button", { type: "button", class: "plain first", "aria-disabled": no !== null, title: no ?? "", onclick: () => act("reset") }, "Reset");
 
 export const report = (session, text) =>
   h("a", { href: `/sessions/${session}/report`, target: "_blank", rel: "noopener" }, text ?? session);

@@ -18,14 +18,31 @@ export const s = (tag, attributes, ...children) =>
   made(document.createElementNS(SVG, tag), attributes, children);
 export const $ = (id) => document.getElementById(id);
 
-// Replaces what an element holds; whoever had the focus in it keeps it where it is still there.
+// Replaces what an element holds; whoever had the focus in it keeps it where it is still there,
+// else is taken to the heading of what has changed: never to nowhere.
 export function fill(element, ...children) {
   const held = element.contains(document.activeElement) ? document.activeElement : null;
   element.replaceChildren(...children.flat(Infinity).filter(Boolean));
   if (!held || held === element) return;
   const name = (e) => e.dataset.name ?? e.getAttribute("href") ?? `${e.tagName} ${e.textContent}`;
   const again = [...element.querySelectorAll("a, button, input, summary")].find((e) => name(e) === name(held));
-  again?.focus({ preventScroll: true });
+  (again ?? heading(element)).focus({ preventScroll: true });
+}
+
+// Changes what is shown; whoever loses the focus by it is taken to `next`, else to the heading.
+export function keeping(change, next = null) {
+  const held = document.activeElement;
+  const above = held && heading(held);
+  change();
+  if (!held || held === document.body || held.getClientRects().length) return;
+  (next?.getClientRects().length ? next : above).focus({ preventScroll: true });
+}
+
+// The heading of the card that an element is in; of what is in none, the cell's state.
+export function heading(element) {
+  const found = element.closest("section.card")?.querySelector("h2") ?? $("state");
+  found.tabIndex = -1;
+  return found;
 }
 
 // Changes text only where it differs: a screen reader would read it out again.
@@ -68,10 +85,11 @@ export function ago(seconds) {
   return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${(seconds / 3600).toFixed(1)} h`;
 }
 
-export function day(iso) {
+// A day and time that nobody can misread, on this machine's clock; the tip has UTC.
+export function moment(iso) {
   if (!iso) return "\u2013";
   const then = new Date(iso);
-  const today = then.toDateString() === new Date().toDateString();
-  const date = then.toLocaleDateString([], { day: "numeric", month: "short" });
-  return (today ? "" : `${date}, `) + clock(iso);
+  const two = (n) => String(n).padStart(2, "0");
+  const day = `${then.getFullYear()}-${two(then.getMonth() + 1)}-${two(then.getDate())}`;
+  return h("time", { datetime: iso, title: `${then.toISOString().slice(0, 19)} UTC` }, `${day} ${clock(iso)}`);
 }

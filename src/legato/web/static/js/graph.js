@@ -2,7 +2,7 @@
 // page from top to bottom), what breaks it off beside it, and the ways out of the present state.
 
 import { $, fill, s, spoken } from "./dom.js";
-import { on, known } from "./live.js";
+import { believed, known, on } from "./live.js";
 
 const ASIDE = ["paused", "stopping", "fault"];
 const WIDE = { w: 104, h: 34, gap: 128, aside: 120 };
@@ -15,20 +15,22 @@ narrow.addEventListener("change", draw);
 function draw() {
   if (!known.table) return;
   const { states, transitions } = known.table;
-  const present = known.state?.state;
+  const heard = known.state?.state;
+  const present = believed() ? heard : null;
   const { places, size } = narrow.matches ? down(states) : across(states);
   const out = transitions.filter(([from]) => from === present);
   const steps = new Set(run(states, transitions).map(String));
   const picture = s("svg", {
     viewBox: `0 0 ${size[0]} ${size[1]}`, role: "img", class: narrow.matches ? "narrow" : "",
-    "aria-label": `States of the cell. Present: ${spoken(present)}. From here: ${out.map(([, to]) => spoken(to)).join(", ")}.`,
+    "aria-label": present ? `States of the cell. Present: ${spoken(present)}. From here: ${out.map(([, to]) => spoken(to)).join(", ")}.`
+      : `States of the cell. The present one is not known; the last that was heard: ${spoken(heard)}.`,
   }, heads(),
   transitions.map((way) => {
     const lit = way[0] === present;
     const kind = lit ? "way lit" : steps.has(String(way)) ? "way step" : "way";
     return s("path", { class: kind, d: curve(places[way[0]], places[way[1]]), "marker-end": lit ? "url(#lit)" : steps.has(String(way)) ? "url(#step)" : null });
   }).sort((a, b) => rank(a) - rank(b)),
-  states.map((state) => node(state, places[state], state === present)));
+  states.map((state) => node(state, places[state], state === present ? "present" : state === heard ? "last" : "")));
   fill($("graph"), picture);
 }
 
@@ -65,9 +67,9 @@ function down(states) {
   return { places, size: [360, height] };
 }
 
-function node(state, { x, y, w, h }, present) {
+function node(state, { x, y, w, h }, standing) {
   const aside = ASIDE.includes(state);
-  return s("g", { class: `node ${present ? "present" : ""} ${aside ? `aside ${state}` : ""}`, transform: `translate(${x} ${y})` },
+  return s("g", { class: `node ${standing} ${aside ? `aside ${state}` : ""}`, transform: `translate(${x} ${y})` },
     s("rect", { x: -w / 2, y: -h / 2, width: w, height: h, rx: aside ? h / 2 : 6 }),
     s("text", { "text-anchor": "middle", dy: "0.34em" }, state.replace("_", " ")));
 }

@@ -1,21 +1,24 @@
 // Past sessions with their reports, and the last events.
 
 import { report } from "./alerts.js";
-import { $, clock, day, fill, fixed, h, signed, spoken } from "./dom.js";
+import { $, clock, fill, fixed, h, moment, signed, spoken } from "./dom.js";
 import { on } from "./live.js";
 
 const TONES = { done: "good", stopped: "calm", refused: "warn", fault: "bad", interrupted: "bad" };
 
+// What an outcome says by itself, where the daemon gives no reason.
+const WHY = { stopped: "a stop was asked for" };
+
 on("sessions", ({ sessions }) => {
   if (!sessions.length) return fill($("sessions"), h("p", { class: "empty" }, "No session yet."));
   fill($("sessions"), h("table", {},
-    h("thead", {}, h("tr", {}, ["Began", "Job", "Outcome", "Why", "Report"].map((t) => h("th", { scope: "col" }, t)))),
+    h("thead", {}, h("tr", {}, ["Began", "Job", "Outcome", "Report", "Why"].map((t) => h("th", { scope: "col" }, t)))),
     h("tbody", {}, sessions.map((row) => h("tr", {},
-      h("td", { class: "num" }, day(row.started)),
+      h("td", { class: "num" }, moment(row.started)),
       h("td", {}, row.job),
       h("td", {}, h("span", { class: `badge ${row.outcome ? TONES[row.outcome] : "busy"}` }, row.outcome ?? "running")),
-      h("td", { class: "why" }, row.reason ?? ""),
-      h("td", {}, h("span", { "aria-label": `Report of ${row.id}` }, report(row.id, "open"))))))));
+      h("td", {}, report(row.id, "open")),
+      h("td", { class: "why" }, row.reason ?? WHY[row.outcome] ?? ""))))));
   for (const link of $("sessions").querySelectorAll("a")) {
     link.setAttribute("aria-label", `Open the report of session ${link.pathname.split("/")[2]}`);
   }

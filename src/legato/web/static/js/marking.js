@@ -2,11 +2,12 @@
 // calibrate as picks. By mouse, by touch, or by arrow keys and Enter.
 
 import { act, against, mayAct, onRights, snap } from "./acts.js";
-import { fixed, h, s } from "./dom.js";
+import { $, fixed, h, heading, s } from "./dom.js";
 import { known, on } from "./live.js";
 
 const LEAST = 6; // marks below which no pose can be told
 const ZOOM = 4;
+const HALF = 64; // px, of the lens
 
 let picks = null; // [[name, [u, v]]] in the order in which they were given; null while not marking
 let found = { marks: {}, missing: {} };
@@ -15,6 +16,7 @@ let again = false;
 let current = null;
 let pointer = null; // [u, v] of the cross-hair
 let frame = null;
+const loupe = h("div", { class: "loupe", "aria-hidden": "true" }); // beside the picture, never over it
 let announce = "";
 const changed = [];
 
@@ -30,8 +32,12 @@ on("picture", (_, { picture }) => {
 const key = (view) => `${view.session}/${view.name}`;
 const names = () => Object.keys(known.cell?.leg.marks ?? {});
 
+// Whether picks for the picture that is shown can be sent now.
+export const canMark = () =>
+  Boolean(known.picture && !known.picture.earlier) && !picks && against("calibrate") === null;
+
 export function startMarking() {
-  if (!known.picture || picks) return;
+  if (!canMark()) return;
   picks = [];
   picks.of = key(known.picture);
   found = { marks: {}, missing: {} };
@@ -43,28 +49,26 @@ export function startMarking() {
 }
 
 function finish() {
+  const within = frame.closest("section").contains(document.activeElement);
   picks = current = pointer = null;
   redraw();
+  if (within) ($("mark") ?? heading(frame)).focus();
 }
 
 export function watchPicture(element) {
   frame = element;
-  const loupe = h("div", { class: "loupe", hidden: true });
-  frame.append(loupe);
   const at = (event) => {
     const box = frame.querySelector("img").getBoundingClientRect();
     const [w, tall] = known.picture.size;
     return [((event.clientX - box.left) / box.width) * w - 0.5, ((event.clientY - box.top) / box.height) * tall - 0.5];
   };
   const magnify = () => {
-    loupe.hidden = !picks || !pointer;
-    if (loupe.hidden) return;
+    if (!picks || !pointer) return;
     const [w, tall] = known.picture.size;
     const [u, v] = pointer;
-    loupe.classList.toggle("left", u > w / 2);
     loupe.style.backgroundImage = `url("${frame.querySelector("img").src}")`;
     loupe.style.backgroundSize = `${w * ZOOM}px ${tall * ZOOM}px`;
-    loupe.style.backgroundPosition = `${64 - (u + 0.5) * ZOOM}px ${64 - (v + 0.5) * ZOOM}px`;
+    loupe.style.backgroundPosition = `${HALF - (u + 0.5) * ZOOM}px ${HALF - (v + 0.5) * ZOOM}px`;
   };
   changed.push(() => {
     frame.classList.toggle("marking", picks !== null);
@@ -160,6 +164,7 @@ export function markingTools() {
   const no = against("calibrate") ?? (snapped < LEAST ? `Mark at least ${LEAST}; ${snapped} have snapped.` : null);
   const button = (text, click, off) => h("button", { type: "button", class: "plain", "data-name": text.split(" ")[0], "aria-disabled": Boolean(off), title: off ?? "", onclick: () => !off && click() }, text);
   return h("section", { class: "byhand", "aria-label": "Marks by hand" },
+    loupe,
     h("p", { class: "point" }, current ? ["Point at ", h("strong", {}, current), "."] : "All marks are placed.", " Leave out what cannot be seen."),
     h("div", { class: "chips", role: "group", "aria-label": "Mark to place" }, names().map((name) => {
       const given = picks.some(([n]) => n === name);

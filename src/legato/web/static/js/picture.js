@@ -1,9 +1,9 @@
 // The camera's last picture, and over it what was found, what was predicted, and how far apart.
 
 import { report } from "./alerts.js";
-import { $, day, fill, fixed, h, s } from "./dom.js";
+import { $, fill, fixed, h, moment, s } from "./dom.js";
 import { known, on } from "./live.js";
-import { markingTools, marksLayer, onMarking, startMarking, watchPicture } from "./marking.js";
+import { canMark, markingTools, marksLayer, onMarking, startMarking, watchPicture } from "./marking.js";
 
 const LAYERS = { leg: "Leg", marks: "Marks", residuals: "Residuals" };
 const shown = { leg: true, marks: true, residuals: true };
@@ -23,7 +23,9 @@ fill($("picture"), frame, tools, text);
 watchPicture(frame);
 
 on("picture cell state table line", draw);
+on("status", () => canMark() !== offered && draw());
 onMarking(draw);
+let offered = false; // marking by hand
 
 function draw() {
   const view = known.picture;
@@ -33,10 +35,12 @@ function draw() {
   if (image.getAttribute("src") !== address) image.src = address;
   image.alt = described(view);
   over.setAttribute("viewBox", `0 0 ${view.size[0]} ${view.size[1]}`);
+  frame.classList.toggle("earlier", view.earlier);
   const marking = marksLayer();
   // Pixel centres lie at whole numbers, the drawing's corner at the picture's.
-  fill(over, s("g", { transform: "translate(0.5 0.5)" }, marking ?? layers(view.solved)));
+  fill(over, s("g", { transform: "translate(0.5 0.5)" }, marking ?? layers(view.earlier ? null : view.solved)));
   fill(tools, markingTools());
+  offered = canMark();
   fill(text, caption(view));
 }
 
@@ -75,20 +79,24 @@ function arrow([u, v], [du, dv]) {
 function caption(view) {
   const solved = view.solved;
   const missing = Object.entries(solved?.missing ?? {});
+  const from = h("p", { class: "note" }, view.simulated && "Simulated: ", `${view.name.replace("frames/", "")} of session `, report(view.session), ", ", moment(view.started), ". ");
+  if (view.earlier) return [h("p", { class: "note" }, h("span", { class: "badge warn" }, "Earlier session"), " Taken before the daemon started: what lies there now is not known."), from];
+  from.append(solved
+    ? h("span", {}, h("strong", { class: solved.accepted ? "good" : "bad" }, solved.accepted ? "Accepted" : "Not accepted"),
+      `, residuals ${fixed(solved.rms_px, 3)} px rms, drawn ${solved.magnified} times as long.`)
+    : "Not solved: this is the picture as the camera gave it.");
   return [
-    h("p", { class: "note" }, view.simulated && "Simulated: ", `${view.name.replace("frames/", "")} of session `, report(view.session), `, ${day(view.started)}. `,
-      solved ? h("span", {}, h("strong", { class: solved.accepted ? "good" : "bad" }, solved.accepted ? "Accepted" : "Not accepted"),
-        `, residuals ${fixed(solved.rms_px, 3)} px rms, drawn ${solved.magnified} times as long.`)
-        : "Not solved: this is the picture as the camera gave it."),
-    h("p", { class: "legend", "aria-hidden": "true" },
+    from,
+    solved && h("p", { class: "legend", "aria-hidden": "true" },
       h("span", { class: "k leg" }, "leg and stations, projected"), h("span", { class: "k seen" }, "marks, seen"), h("span", { class: "k residual" }, "predicted \u2212 seen")),
     missing.length > 0 && h("p", { class: "note" }, "Missing: ", missing.map(([name, why]) => `${name} (${why})`).join("; "), "."),
     solved?.reasons?.length > 0 && h("ul", { class: "bad" }, solved.reasons.map((r) => h("li", {}, r))),
-    h("p", {}, h("button", { type: "button", class: "plain", id: "mark", onclick: startMarking }, "Mark by hand")),
+    offered && h("p", {}, h("button", { type: "button", class: "plain", id: "mark", "data-name": "mark", onclick: startMarking }, "Mark by hand")),
   ];
 }
 
 function described(view) {
+  if (view.earlier) return "A picture of an earlier session.";
   if (!view.solved) return "The camera\u2019s last picture; no leg was found in it.";
   const seen = Object.values(view.solved.marks).filter((m) => m.seen).length;
   return `The camera\u2019s picture of the leg: ${seen} of ${Object.keys(view.solved.marks).length} marks seen, residuals ${fixed(view.solved.rms_px, 3)} px rms.`;

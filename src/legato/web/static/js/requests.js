@@ -1,8 +1,8 @@
 // The buttons: each is what the table allows in the present state, and says why where it does not.
 
 import { act, against, onRights } from "./acts.js";
-import { $, fill, h } from "./dom.js";
-import { known, on } from "./live.js";
+import { $, fill, h, keeping } from "./dom.js";
+import { believed, known, on } from "./live.js";
 
 const GROUPS = [["run"], ["capture", "calibrate", "verify", "home", "massage"], ["pause", "resume"], ["reset", "reference"]];
 const buttons = {};
@@ -15,6 +15,13 @@ fill($("acts"), GROUPS.map((group) => h("span", { class: "group" }, group.map((m
 buttons.pause.append(" ", h("kbd", {}, "Alt P"));
 
 on("table state line cell", show);
+let lacked = ""; // a status comes every second, and mostly says the same
+on("status", ({ status }) => {
+  const lacks = JSON.stringify(status.lacking ?? {});
+  if (lacks === lacked) return;
+  lacked = lacks;
+  show();
+});
 onRights(show);
 
 function show() {
@@ -23,9 +30,17 @@ function show() {
     button.setAttribute("aria-disabled", no !== null);
     button.title = no ?? known.table?.methods[method] ?? "";
   }
-  if (against("reference")) $("reference").hidden = true;
-  buttons.resume.hidden = known.state?.state !== "paused";
-  buttons.pause.hidden = !buttons.resume.hidden;
+  const paused = known.state?.state === "paused";
+  keeping(() => {
+    buttons.resume.hidden = !paused;
+    buttons.pause.hidden = paused;
+  }, paused ? buttons.resume : buttons.pause);
+  // What cannot be sent is not offered.
+  keeping(() => {
+    $("acts").hidden = !believed();
+    $("no-acts").hidden = believed();
+    if (against("reference")) $("reference").hidden = true;
+  }, buttons.reference);
 }
 
 // Reference needs the pose at which the arm stands; the configured start pose is filled in.
@@ -49,5 +64,7 @@ $("reference").addEventListener("submit", async (event) => {
   event.preventDefault();
   const value = (name) => Number(event.target.elements[name].value);
   const xyz_mm = [value("x"), value("y"), value("z")];
-  if (await act("reference", { xyz_mm, pitch_deg: value("pitch"), roll_deg: value("roll") })) event.target.hidden = true;
+  if (await act("reference", { xyz_mm, pitch_deg: value("pitch"), roll_deg: value("roll") })) {
+    keeping(() => (event.target.hidden = true), buttons.reference);
+  }
 });

@@ -47,9 +47,9 @@ if (renderer) {
   const dark = matchMedia("(prefers-color-scheme: dark)");
   dark.addEventListener("change", paint);
   on("cell", build);
-  on("solved", layLeg);
-  on("arm line", pose);
-  on("session", (_, { session }) => session && session.outcome === null && clearTrail());
+  on("leg", layLeg);
+  on("arm line leg", pose);
+  on("session line", clearTrail);
   views();
   turning();
 }
@@ -108,7 +108,7 @@ function build({ cell }) {
   parts.finger = rod("finger", arm.finger_radius_mm, arm.finger_radius_mm * 0.55);
   parts.shoulder = ball("joint", arm.forearm_radius_mm * 1.25);
   parts.elbow = ball("joint", arm.forearm_radius_mm);
-  parts.wrist = ball("joint", arm.hand_radius_mm * 0.85);
+  parts.wrist = ball("wrist", arm.hand_radius_mm);
   parts.tip = ball("tip", 4.5);
   parts.leg = new THREE.Group();
   const side = new THREE.Mesh(new THREE.CylinderGeometry(leg.small_radius_mm, leg.big_radius_mm, leg.length_mm, 64), material("leg"));
@@ -148,12 +148,14 @@ function sight({ world_from_camera: m, height_deg, aspect }) {
   return new THREE.LineSegments(lines, wire("sight"));
 }
 
-function layLeg({ solved }) {
-  const m = solved?.solved?.world_from_object;
-  if (!m || !parts.leg) return;
-  parts.leg.matrix.set(...m.flat());
-  parts.leg.matrixWorldNeedsUpdate = true;
-  parts.leg.visible = true;
+// A leg that the daemon knows nothing of any more is not drawn.
+function layLeg({ leg }) {
+  if (!parts.leg) return;
+  parts.leg.visible = Boolean(leg);
+  if (leg) {
+    parts.leg.matrix.set(...leg.world_from_object.flat());
+    parts.leg.matrixWorldNeedsUpdate = true;
+  }
   draw();
 }
 
@@ -161,11 +163,11 @@ function pose() {
   if (!parts.upper) return;
   const links = known.arm?.links_mm;
   for (const name of ["upper", "fore", "hand", "finger", "shoulder", "elbow", "wrist", "tip"]) parts[name].visible = Boolean(links);
-  canvas.setAttribute("aria-label", links
-    ? `Arm and leg in three dimensions. Fingertip at ${links[3].map((v) => fixed(v, 0)).join(", ")} mm.`
-    : "Leg in three dimensions. Where the arm stands is not known.");
-  note.hidden = Boolean(links);
-  if (!links) note.textContent = "Where the arm stands is not known.";
+  const unknown = [!links && "Where the arm stands is not known.", !known.leg && "Where the leg lies is not known."].filter(Boolean).join(" ");
+  const at = links ? ` Fingertip at ${links[3].map((v) => fixed(v, 0)).join(", ")} mm.` : "";
+  canvas.setAttribute("aria-label", `Arm and leg in three dimensions.${at} ${unknown}`.trim());
+  note.hidden = !unknown;
+  note.textContent = unknown;
   if (links) {
     const [shoulder, elbow, wrist, tip] = links;
     const { hand_mm, finger_length_mm } = known.cell.arm;
@@ -190,12 +192,26 @@ function follow(tip) {
   const last = trail.at(-1);
   if (last && Math.hypot(...tip.map((v, k) => v - last[k])) < 0.2) return;
   trail = [...trail, tip].slice(-TRAIL);
+  drawTrail();
+}
+
+function drawTrail() {
+  if (!parts.trail) return;
   parts.trail.geometry.dispose();
   parts.trail.geometry = new THREE.BufferGeometry();
   parts.trail.geometry.setAttribute("position", new THREE.Float32BufferAttribute(trail.flat(), 3));
 }
+
+// The trail is one session's, of one daemon: a new one begins its own.
+let trailOf = {};
 function clearTrail() {
+  const begun = known.session?.outcome === null ? known.session.id : trailOf.session;
+  const boot = known.line?.boot ?? trailOf.boot;
+  if (begun === trailOf.session && boot === trailOf.boot) return;
+  trailOf = { boot, session: begun };
   trail = [];
+  drawTrail();
+  draw();
 }
 
 // Lays a rod of length one from a to b.

@@ -1,4 +1,4 @@
-"""One event of the daemon as one line for a person."""
+"""One event as one line for a person: of the daemon as it comes, or of a record."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,7 +20,7 @@ def line_of(topic: str, event: Mapping[str, Any]) -> str:
             )
         case "fault":
             hint = f"; {event['hint']}" if event.get("hint") else ""
-            return f"fault {event.get('cause')}: {event.get('text')}{hint}"
+            return f"{event.get('cause')}: {event.get('text')}{hint}"
         case "session":
             outcome = event.get("outcome") or "begun"
             reason = f": {event['reason']}" if event.get("reason") else ""
@@ -32,7 +32,8 @@ def line_of(topic: str, event: Mapping[str, Any]) -> str:
         case "heartbeat":
             return f"{event.get('state')}, up {_figure(event, 'uptime_s', '.0f')} s"
         case _:
-            return ", ".join(f"{k} {v}" for k, v in event.items() if k not in HEAD)
+            told = ((k, v) for k, v in event.items() if k not in HEAD and v is not None)
+            return "; ".join(f"{k}: {v}" for k, v in told)
 
 
 HEAD = ("boot", "seq", "t", "session")
