@@ -19,8 +19,9 @@ from bench.row import Row, keep
 from tests.system import judge
 from tests.system.attacked import SHORT, attacked
 from tests.system.emulated import Cell
-from tests.system.machine import LINE_FAULTS, SIM_FAULTS, Ward, let_loose
+from tests.system.machine import let_loose
 from tests.system.test_survive_line import TABLES
+from tests.system.ward import LINE_FAULTS, SIM_FAULTS, Ward
 
 WARDS = 7  # of each kind
 EXAMPLES, STEPS = 24, 40

@@ -12,7 +12,8 @@ import numpy as np
 
 from bench.row import Row, keep
 from tests.system import judge
-from tests.system.attacked import SHORT, Attacked, Line, attacked, ready_to_massage
+from tests.system.attacked import SHORT, Attacked, attacked
+from tests.system.line import Line, ready_to_massage
 
 SESSIONS = 1000
 EVERY = 20  # sessions between two looks at memory, files and latencies

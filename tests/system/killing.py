@@ -9,8 +9,9 @@ import numpy as np
 
 from legato.records.record import read_session
 from legato.records.whole import verify_record
-from tests.system.attacked import Attacked, Line, brought_to_idle, ready_to_massage
+from tests.system.attacked import Attacked
 from tests.system.emulated import HOME, Cell
+from tests.system.line import Line, brought_to_idle, ready_to_massage
 
 RETURN_S = 30.0
 JOBS = ("run", "run", "massage", "massage", "home")

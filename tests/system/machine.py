@@ -4,14 +4,8 @@ Hypothesis draws what it does. What the daemon answers is held against what was 
 an example ends, everything it has left on the disk is judged.
 """
 
-import shutil
 import signal
-import sys
 import time
-import traceback
-from collections import Counter, deque
-from pathlib import Path
-from typing import Any, ClassVar
 
 import numpy as np
 import zmq
@@ -19,110 +13,15 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import seed as hypothesis_seed
 from hypothesis import strategies as st
 from hypothesis.stateful import (
-    RuleBasedStateMachine,
-    initialize,
     rule,
     run_state_machine_as_test,
 )
 
 from legato.control.table import JOBS
-from tests.system import judge, junk
-from tests.system.attacked import Attacked, Line, brought_to_idle, ready_to_massage
-from tests.system.emulated import HOME, Cell
-
-STATIONS = (7.0, 67.0)
-ANSWER_S = 5.0  # until status has to be answered, on a machine that is busy with something else
-BUGS = ("bug", "worker_gone", "not_tidied")
-TRAIL, KEPT_BYTES, KEPT_SESSIONS = 2000, 2_000_000, 8  # of what a violation leaves
-KNOWN = {
-    -32700, -32600, -32601, -32602, -32000, -32001, -32002, -32003, -32004, -32005, -32006,
-}  # fmt: skip
-CHANCES: tuple[tuple[str, float, dict[str, Any]], ...] = (
-    ("arm_lost", 0.004, {"for_s": 5.0}),
-    ("arm_lost", 0.004, {"on": "read"}),
-    ("arm_timeout", 0.004, {}),
-    ("arm_refused", 0.004, {}),
-    ("arm_stopped_by_pendant", 0.004, {}),
-    ("arm_blocks", 0.004, {"by": 40.0}),
-    ("following_error", 0.004, {}),
-    ("lost_steps", 0.004, {}),
-    ("stuck_open", 0.002, {"for_s": 20.0}),
-    ("stuck_closed", 0.002, {"for_s": 20.0}),
-    ("early_contact", 0.004, {}),
-    ("camera_lost", 0.03, {"for_s": 4.0}),
-    ("camera_stale", 0.04, {}),
-    ("blank", 0.03, {}),
-    ("dark", 0.03, {}),
-    ("slow_grab", 0.05, {"by": 20.0}),
-)
-SIM_FAULTS = [
-    {"kind": kind, "p": p, "seed": seed, **more} for seed, (kind, p, more) in enumerate(CHANCES)
-]
-LINE_FAULTS = (
-    "silence:p=0.005", "late:p=0.005,by=40", "garbage:p=0.005", "0:p=0.005", "2:p=0.005",
-    "hang-up:p=0.004,by=0.1", "restart:p=0.004", "lost-steps:p=0.005,by=40",
-    "silence:p=0.004,on=read",
-)  # fmt: skip
-
-
-class Ward:
-    """The daemon that all examples share, and what is known of its life."""
-
-    def __init__(
-        self, cell: Attacked, emulator: Cell | None = None, evidence: Path | None = None
-    ) -> None:
-        self.cell = cell
-        self.emulator = emulator
-        self.evidence = evidence
-        self.broken: str | None = None
-        self.trail: deque[str] = deque(maxlen=TRAIL)
-        self.backs: list[float] = []
-        """How long each start took to its first answer."""
-        self.steps = 0
-        self.done: Counter[str] = Counter()
-        self.outcomes: Counter[str] = Counter()
-        self.causes: Counter[str] = Counter()
-        self.kills: list[float] = []
-        self.judged: set[Path] = set()
-        self.slowest = 0.0
-        self.judged_at = 0.0
-        self.never = ""
-
-    def tip(self) -> dict[str, Any]:
-        """Return where the arm truly stands, for referencing it."""
-        return dict(self.emulator.truth()["tip"]) if self.emulator is not None else dict(HOME)
-
-    def say(self, text: str) -> None:
-        """Take down one thing that was done, or answered."""
-        self.trail.append(f"{time.monotonic():.3f} {self.steps} {text}")
-
-    def broke_off(self, error: Exception) -> None:
-        """Keep what the first violation was, and all that shows how it came about."""
-        if self.broken is not None:
-            return
-        self.broken = "".join(traceback.format_exception(error))
-        if self.evidence is None:
-            return
-        folder, cell = self.evidence, self.cell
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
-        code = cell.process.poll()
-        ended = f"the daemon has ended with {code}" if code is not None else "the daemon runs"
-        (folder / "violation.txt").write_text(f"{self.broken}\n{ended}\n")
-        (folder / "steps.txt").write_text("\n".join(self.trail) + "\n")
-        (folder / "daemon.log").write_bytes(cell.log.read_bytes()[-KEPT_BYTES:])
-        (folder / "cell.toml").write_bytes(cell.config.read_bytes())
-        if self.emulator is not None:
-            line = (self.emulator.folder / "line.txt").read_bytes()
-            (folder / "line.txt").write_bytes(line[-KEPT_BYTES:])
-        for path in judge.folders(cell.state_dir)[-KEPT_SESSIONS:]:
-            shutil.copytree(path, folder / "sessions" / path.name, symlinks=True)
-
-    def fresh(self) -> list[Path]:
-        """Return the sessions that have not been judged, and take them for judged."""
-        found = [p for p in judge.folders(self.cell.state_dir) if p not in self.judged]
-        self.judged |= set(found)
-        return found
+from tests.system import junk
+from tests.system.judged import Judged
+from tests.system.line import Line
+from tests.system.ward import Ward
 
 
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
@@ -130,26 +29,8 @@ def numbers(low: float, high: float) -> st.SearchStrategy[float]:
     return st.integers(int(low * 100), int(high * 100)).map(lambda n: n / 100)
 
 
-class Client(RuleBasedStateMachine):
-    """What may be done; `ward` is set by whoever runs it."""
-
-    ward: ClassVar[Ward]
-
-    came = False
-
-    @initialize()
-    def comes(self) -> None:
-        """Connect to a daemon that is idle, and begin to count."""
-        self.cell = self.ward.cell
-        self.line, self.stops = Line(self.cell.lines["requests"]), Line(self.cell.lines["stop"])
-        self.accepted: list[str] = []
-        self.lease: str | None = None
-        self.fault: dict[str, Any] | None = None
-        self.loose = self.repeating = False
-        self.came = True
-        brought_to_idle(self.line)
-
-    # What a client does.
+class Client(Judged):
+    """What may be done, at any moment, in any order."""
 
     @rule(job=st.sampled_from(("massage", "massage", "run")), seconds=numbers(0, 3))
     def awaits_its_job(self, job: str, seconds: float) -> None:
@@ -359,123 +240,6 @@ class Client(RuleBasedStateMachine):
         if how == "kill" and running is not None and self._told(running) == "interrupted":
             assert status["fault"]["cause"] == "interrupted", status
         self.fault = status["fault"]
-
-    # What always holds.
-
-    def teardown(self) -> None:
-        """End the example; what breaks off is kept as it was, before hypothesis tries it again."""
-        if not self.came:
-            return
-        broken = sys.exc_info()[1]  # what a rule has raised
-        try:
-            if isinstance(broken, Exception):
-                self.ward.broke_off(broken)
-            else:
-                self._ends()
-        except Exception as error:
-            self.ward.broke_off(error)
-            raise
-        finally:
-            self.ward.slowest = max(self.ward.slowest, self.line.slowest[1])
-            self.line.close()
-            self.stops.close()
-
-    def _ends(self) -> None:
-        """See that all is answered, all has ended, and what is on the disk is sound."""
-        owed = self.line.drain(25.0)
-        assert not owed, f"never answered: {owed}"
-        assert not self.line.unknown, self.line.unknown[:3]
-        time.sleep(0.35)  # a lease that is held ends by itself, or is longer and its token known
-        if self.lease is not None:
-            self._ask("lease", duration_s=0.0, lease=self.lease)
-        self._ask("end_campaign")
-        self._ask("stop")
-        self.fault = None
-        for session in self.accepted:
-            self.ward.outcomes[self.line.outcome(session)] += 1
-            self.ward.causes[str(self.line.do("session", session=session)["cause"])] += 1
-        status = brought_to_idle(self.line)
-        assert status["fault"] is None
-        self._judge()
-
-    def _judge(self) -> None:
-        """Hold what the example has left to the invariants."""
-        fresh = self.ward.fresh()
-        wrong = list(judge.records(fresh))
-        if self.ward.emulator is not None:
-            motions = [t for t, _ in self.ward.emulator.motions() if t > self.ward.judged_at]
-            wrong += judge.on_the_line(motions, fresh, self.ward.kills)
-            self.ward.judged_at = max(motions, default=self.ward.judged_at)
-        lines = self.cell.logged(since=self.cell.mark)
-        wrong += judge.chained((x for x in lines if x["event"] == "state"), STATIONS)
-        wrong += [str(line) for line in lines if line["event"] in BUGS] + self.cell.said()
-        assert not wrong, "\n".join(wrong[:5])
-
-    def _make_ready(self) -> None:
-        """Reset, reference and find the leg, as far as they are wanting."""
-        if self.lease is not None:
-            self._ask("lease", duration_s=0.0, lease=self.lease)
-        self.lease, self.fault = None, None
-        try:
-            ready_to_massage(self.line, self.ward.tip)
-        except AssertionError as error:
-            self.ward.done["never ready"] += 1
-            self.ward.never = str(error)
-
-    def _one_in(self, count: int) -> bool:
-        """Say yes once in so many steps; hypothesis would draw the extremes too often."""
-        return bool(np.random.default_rng(self.ward.steps).integers(count) == 0)
-
-    def _did(self, what: str) -> None:
-        self.ward.steps += 1
-        self.ward.done[what] += 1
-        self.ward.say(what)
-
-    def _token(self) -> dict[str, Any]:
-        return {"lease": self.lease} if self.lease is not None else {}
-
-    def _ask(self, method: str, **params: Any) -> dict[str, Any]:
-        """Return the answer to a request, which is a result or a refusal that is documented."""
-        number = self.line.send(method, **params)
-        answer = self.cell.answer(self.line, number, 25.0)
-        if "error" in answer:
-            error = answer["error"]
-            self.ward.say(f"{method} {params}: {error['message']}: {error['data']}")
-            assert error["code"] in KNOWN, (method, params, error)
-            assert error["data"]["reason"], (method, error)
-            if error["message"] == "expired" and method != "lease":
-                self.lease = None
-        else:
-            self.ward.say(f"{method} {params}: {str(answer['result'])[:300]}")
-        return answer
-
-    def _status(self, *, back: bool = False) -> dict[str, Any]:
-        """Look, and see that a fault is latched until somebody resets."""
-        if back:
-            answer, took = self.cell.back(self.line)
-            self.ward.backs.append(took)
-        else:
-            answer = self.cell.answer(self.line, self.line.send("status"), ANSWER_S)
-        status: dict[str, Any] = answer["result"]
-        fault = status["fault"]
-        self.ward.say(f"status: {status['state']} {status['session']} {fault} {status['campaign']}")
-        assert (fault is not None) == (status["state"] == "fault"), status
-        repeating = bool((status["campaign"] or {}).get("underway"))
-        owed = any(method == "reset" for method, _ in self.line.pending.values())
-        if self.fault is not None and not (self.loose or self.repeating):
-            assert fault == self.fault, f"{self.fault} was latched, now {fault}"
-        # Who has been asked to reset may do so at any moment from now on.
-        self.fault = None if owed or repeating else fault
-        self.repeating = repeating
-        return status
-
-    def _running(self) -> str | None:
-        status = self._status()
-        return str(status["session"]) if status["state"] not in ("idle", "fault") else None
-
-    def _told(self, session: str) -> str | None:
-        outcome = self._ask("session", session=session)["result"]["outcome"]
-        return str(outcome) if outcome is not None else None
 
 
 def let_loose(ward: Ward, examples: int, steps: int, *, seed: int | None = None) -> None:

@@ -11,7 +11,8 @@ import zmq
 
 from legato.daemon.keys import Keys
 from tests.system import junk
-from tests.system.attacked import LINES, Attacked, Line
+from tests.system.attacked import LINES, Attacked
+from tests.system.line import Line
 
 LOOKS = 20  # messages between two looks at status
 ANEW = 40  # messages of one client before it is another

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from legato.daemon.keys import Keys, make_keys, read_public, read_secret
-from tests.system.attacked import SHORT, Attacked, Line, answering, attacked
+from tests.system.attacked import SHORT, Attacked, attacked
+from tests.system.line import Line, answering
 from tests.system.pelting import KINDS, pelt
 
 MESSAGES = 400

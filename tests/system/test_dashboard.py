@@ -10,7 +10,8 @@ from typing import Any
 from prometheus_client.parser import text_string_to_metric_families
 
 from legato.config.load import shipped
-from tests.system.attacked import SHORT, Line, attacked
+from tests.system.attacked import SHORT, attacked
+from tests.system.line import Line
 
 SELECTOR = re.compile(r"\b((?:legato|process)_[a-z_]+)(?:\{([^}]*)\})?")
 MATCHER = re.compile(r'(\w+)(=~|=)"([^"]*)"')

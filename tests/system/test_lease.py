@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 
 from legato.daemon.client import Client
-from tests.system.attacked import SHORT, Line, attacked
+from tests.system.attacked import SHORT, attacked
+from tests.system.line import Line
 
 
 def test_the_cell_is_its_commands_alone(tmp_path: Path) -> None:

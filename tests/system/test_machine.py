@@ -4,8 +4,9 @@ from pathlib import Path
 
 from tests.system.attacked import SHORT, attacked
 from tests.system.emulated import Cell
-from tests.system.machine import LINE_FAULTS, SIM_FAULTS, Ward, let_loose
+from tests.system.machine import let_loose
 from tests.system.test_survive_line import TABLES
+from tests.system.ward import LINE_FAULTS, SIM_FAULTS, Ward
 
 
 def test_anything_at_any_moment_in_process(tmp_path: Path) -> None:

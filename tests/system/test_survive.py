@@ -13,17 +13,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tests.system import judge
-from tests.system.attacked import (
-    SERVE,
-    SHORT,
-    Attacked,
-    Line,
-    Places,
-    attacked,
-    ready_to_massage,
-)
+from tests.system.attacked import SERVE, SHORT, Attacked, Places, attacked
 from tests.system.emulated import configuration
 from tests.system.killing import kill
+from tests.system.line import Line, ready_to_massage
 
 NO_ROOT = (
     "import ctypes, os, sys; libc = ctypes.CDLL(None)\n"

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from tests.system import judge
-from tests.system.attacked import SHORT, Attacked, Line, attacked, ready_to_massage
+from tests.system.attacked import SHORT, Attacked, attacked
 from tests.system.emulated import Cell
 from tests.system.killing import kill
+from tests.system.line import Line, ready_to_massage
 
 TABLES: dict[str, dict[str, Any]] = {
     name: table for name, table in SHORT.items() if name != "robot"

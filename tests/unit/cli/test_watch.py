@@ -2,39 +2,13 @@
 
 import io
 import re
-import time
-from collections.abc import Callable, Iterator
-from typing import Any, cast
 
 import pytest
 from rich.console import Console
 
-from legato.cli import watch
 from legato.cli.live import STALE_S, Live
 from legato.cli.screen import fault_rows, screen
-from legato.daemon.client import Client, DaemonUnavailable
-
-STATES = ("idle", "capture", "calibrate", "verify", "move_home", "massage_7", "massage_67",
-          "paused", "stopping", "fault")  # fmt: skip
-ARM = {"connected": True, "referenced": True, "xyz_mm": [127.0, -2.5, 60.0], "pitch_deg": -90.0,
-       "roll_deg": 0.0, "contact": False}  # fmt: skip
-
-
-def status(state: str = "idle", boot: str = "b1", **more: Any) -> dict[str, Any]:
-    """Return what a daemon answers to `status`."""
-    return {
-        "boot": boot, "version": "0.1.0", "simulated": True, "state": state, "session": None,
-        "progress": None, "arm": dict(ARM), "camera": {"connected": True, "age_s": 3.0},
-        "calibration": {"valid": True, "age_s": 9.0, "rms_px": 0.007, "sigma_mm": 0.11},
-        "fault": None, **more,
-    }  # fmt: skip
-
-
-def seen() -> Live:
-    """Return a view that a daemon has answered at 10 s."""
-    live = Live("tcp://127.0.0.1:5760", STATES)
-    live.answered(status(), 10.0)
-    return live
+from tests.unit.cli.watched import ARM, seen, status
 
 
 def drawn(live: Live, now: float, width: int = 120, height: int = 40) -> str:
@@ -248,58 +222,3 @@ def test_it_draws_at_any_size_and_before_anything_is_known(width: int, height: i
         lines = drawn(live, 15.0, width, height).splitlines()
         assert len(lines) <= height
         assert max(map(len, lines)) <= width
-
-
-class Flaky:
-    """A client whose daemon answers, dies, and comes back as another; then Ctrl-C."""
-
-    def __init__(self) -> None:
-        self.answers: list[Any] = [status(), DaemonUnavailable("gone"), status(boot="b2")]
-
-    def call(self, method: str) -> Any:
-        """Answer as told, in order."""
-        if method == "describe":
-            return {"states": STATES}
-        if not self.answers:
-            raise KeyboardInterrupt
-        answer = self.answers.pop(0)
-        if isinstance(answer, Exception):
-            raise answer
-        return answer
-
-    def events(self, timeout_s: float) -> Iterator[tuple[str, dict[str, Any]]]:
-        """Give nothing."""
-        del timeout_s
-        return iter(())
-
-
-def test_the_screen_outlives_the_daemon() -> None:
-    """A daemon that dies and another one that comes are both drawn; Ctrl-C ends it."""
-    shown: list[str] = []
-
-    def listen(client: Client, live: Live, draw: Callable[[], None]) -> None:
-        del client
-        draw()
-        shown.append(live.link(time.monotonic()) + " " + str(live.boot))
-
-    console = Console(width=100, height=30, force_terminal=True, file=io.StringIO())
-    with pytest.raises(KeyboardInterrupt):
-        watch.full_screen(cast(Client, Flaky()), "tcp://127.0.0.1:5760", console, listen)
-    assert shown == ["live b1", "lost b1", "live b2"]
-
-
-def test_events_are_taken_and_drawn_as_they_come() -> None:
-    """Every event reaches the view; a fault ends the listening, so that its hint is asked for."""
-    live, drawings = seen(), []
-    live.take("heartbeat", {"boot": "b1", "state": "idle", "uptime_s": 1.0}, time.monotonic())
-
-    class Telling(Flaky):
-        def events(self, timeout_s: float) -> Iterator[tuple[str, dict[str, Any]]]:
-            del timeout_s
-            yield "state", {"boot": "b1", "state": "massage_7"}
-            yield "state", {"boot": "b1", "state": "fault"}
-            yield "state", {"boot": "b1", "state": "idle"}
-
-    watch.hear(cast(Client, Telling()), live, lambda: drawings.append(live.state))
-    assert live.state == "fault"
-    assert drawings[-1] == "fault"
