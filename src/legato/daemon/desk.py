@@ -147,7 +147,9 @@ class Desk:
             if no is not None:
                 raise Failure(no.code, no.reason, no.hint)
         request = decode_params(call)
-        self._acts += call.method not in READERS
+        if call.method in READERS:  # whoever only looks is answered in every state
+            return self._done(ask, request, now)
+        self._acts += 1
         if isinstance(request, Job) and request.key is not None:
             known = self._conductor.standing.sessions.with_key(request.key)
             if known is not None:
@@ -182,7 +184,7 @@ class Desk:
             case Ping():
                 return {"boot": self._events.boot, "state": conductor.state, "now": now}
             case Status():
-                return self._status.told(now, self._version())
+                return self._status.told(now, self.version())
             case Describe():
                 return describe(self._settings.stations)
             case Wait(session=session, timeout_s=timeout):
@@ -234,7 +236,7 @@ class Desk:
         told = conductor.standing.status() | {"lease": conductor.leases.told(now)}
         return told | {"stop": self._stops(), "campaign": conductor.campaigns.told()}
 
-    def _version(self) -> tuple[int, ...]:
+    def version(self) -> tuple[int, ...]:
         """Return what differs once something was asked for, seen or published."""
         conductor = self._conductor
         return self._events.seq, conductor.standing.views, conductor.gate.number, self._acts

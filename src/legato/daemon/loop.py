@@ -19,7 +19,7 @@ from legato.daemon.sockets import Arrived, Sockets
 
 QUIET_S = 0.5  # nothing is logged so long: loading the log would keep the first client waiting
 MOST = 4096  # requests sorted out at once
-BATCH = 64  # messages of one socket handled before the others have their turn
+BATCH = 64  # subscriptions handled before the others have their turn
 
 
 class Loop:
@@ -50,6 +50,8 @@ class Loop:
         self._was_ready = self._was_listening = False
         self._now = now
         self._stops = 0
+        self._seen: tuple[int, ...] = ()  # the desk's version when time was last let pass
+        self._due = 0.0  # when it must pass again
         self._before: deque[tuple[Arrived, int]] = deque()
         self._poller = zmq.Poller()
         self._poller.register(sockets.requests, zmq.POLLIN)
@@ -65,23 +67,30 @@ class Loop:
                 self._conductor.shutdown()
 
     def turn(self) -> None:
-        """Wait for what comes next, and handle all that has come."""
-        due = min(self._conductor.next_due(), self._desk.next_due())
-        if self._before:
-            due = 0.0
+        """Wait for what comes next, and handle it: one request, and all else that has come."""
+        due = 0.0 if self._before else min(self._due, self._desk.next_due())
         heard = dict(self._poller.poll(ceil(max(due - self._now(), 0.0) * 1000.0)))
         self._conductor.wake(self._now())
         if self._mail in heard:
             for message in self._mailbox.drain():
                 self._conductor.receive(message)
         # What is asked first is answered first; a stop is looked for whatever has come.
-        self._requests()
+        self._request(waits=self._sockets.requests in heard)
         if self._sockets.events in heard:
             self._subscriptions()
         # Whoever asks is answered before time is let pass: nothing is due for so short a while.
-        self._conductor.tick(self._now())
-        self._desk.settle(self._now())
+        self._pass_time(mail=self._mail in heard)
         self._tell()
+
+    def _pass_time(self, *, mail: bool) -> None:
+        """Let time pass where it is due or something has changed; a look changes nothing."""
+        now = self._now()
+        early = now < min(self._due, self._desk.next_due())
+        if early and not mail and self._desk.version() == self._seen:
+            return
+        self._conductor.tick(now)
+        self._desk.settle(now)
+        self._due, self._seen = self._conductor.next_due(), self._desk.version()
 
     def _tell(self) -> None:
         """Say once that the daemon listens, and once that it is ready."""
@@ -93,22 +102,21 @@ class Loop:
             self._was_ready = True
             self._ready()
 
-    def _requests(self) -> None:
+    def _request(self, *, waits: bool) -> None:
+        """Answer the next request: one that came before the last stop, or one that `waits`."""
         gate = self._conductor.gate
         if gate.number > self._stops:
             self._sort_out(gate)
             # What these stops end is what ran before: nothing that is asked for after them.
             self._conductor.wake(self._now())
-        for _ in range(BATCH):
-            arrived, stops = (
-                self._before.popleft()
-                if self._before
-                else (self._sockets.receive(self._sockets.requests), self._stops)
-            )
-            if arrived is None:
-                return
-            frames, who = arrived
-            self._desk.receive(frames, self._now(), who, since=stops)
+            waits = False
+        if self._before:
+            (frames, who), stops = self._before.popleft()
+        elif waits:
+            (frames, who), stops = self._sockets.take(self._sockets.requests), self._stops
+        else:
+            return
+        self._desk.receive(frames, self._now(), who, since=stops)
 
     def _sort_out(self, gate: Gate) -> None:
         """Take in, unanswered, all that waits: it came before the last stop, the rest after it."""

@@ -61,8 +61,10 @@ class Sockets:
     def receive(self, socket: "zmq.Socket[bytes]") -> Arrived | None:
         """Return the next message that waits at a socket and who sent it; None where none does."""
         # Looking first is cheaper than the exception that an empty socket raises.
-        if not int(socket.get(EVENTS)) & POLLIN:
-            return None
+        return self.take(socket) if int(socket.get(EVENTS)) & POLLIN else None
+
+    def take(self, socket: "zmq.Socket[bytes]") -> Arrived:
+        """Return the next message of a socket at which one waits, and who sent it."""
         if self._doorman is None:
             frames = [socket.recv(NOBLOCK)]
             while socket.get(RCVMORE):
