@@ -115,10 +115,12 @@ def strangers() -> Iterator[Row]:
                     ]
             for where in LINES:
                 heard = max(heard, overheard(cell.lines[where]), key=len)
-            logged = len(cell.logged("turned_away"))
+            logged = cell.turned_away_after(len(told) - 1)
+            lines = len(cell.logged("turned_away"))
     yield Row("abuse: strangers refused by name", len(told), "", 9 * REFUSALS, at_least=True)
     yield Row("abuse: a stranger is told within, worst", max(told), "s", ANSWER_S)
-    yield Row("abuse: refusals in the log", logged, "", len(told), at_least=True)
+    yield Row("abuse: refusals in the log", logged, "", len(told), at_least=True,
+              note=f"in {lines} lines")  # fmt: skip
     yield Row("abuse: bytes that a plain peer hears, the greeting", len(heard), "B", 64)
 
 

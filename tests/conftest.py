@@ -4,8 +4,10 @@ import signal
 
 from hypothesis import settings
 
-# A shell starts what runs in the background deaf to Ctrl-C, and the tests' children with it.
+# A shell starts what runs in the background deaf to Ctrl-C, nohup to a hang-up, and the tests'
+# children with it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, lambda *_: None)
 
 settings.register_profile("legato", deadline=None)
 settings.load_profile("legato")

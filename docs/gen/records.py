@@ -31,13 +31,14 @@ SESSION: Final[dict[str, str]] = {
     "outcome": "`done`, `stopped`, `refused`, `fault` or `interrupted`; null while it runs",
     "reason": "why it ended so, or null",
     "cause": "the fault's cause, or null",
-    "simulated": "whether no real arm moved",
+    "simulated": "whether the arm or the camera was none",
+    "simulated_devices": "which of them: `arm`, `camera`",
     "boot": "the start of the daemon that it belongs to",
     "versions": "of legato, Python, numpy, OpenCV and what else took part",
     "config_hash": "hash of the configuration",
     "config": "the configuration, every key with its value",
     "intrinsics": "the camera's calibration that was used, or null",
-    "seal": "number and last hash of the events, hashes of the other files",
+    "seal": "number and last hash of the events, hashes of the other files and of this one's rest",
 }
 EVENT: Final[dict[str, str]] = {
     "seq": "number within the record, from 1",
@@ -112,8 +113,9 @@ session that a crash cut off is closed as `interrupted` by the next start, and r
 registers, and of which arm.
 
 Each line of `events.jsonl` carries the hash of the line before, and `session.json` seals the
-number of lines, the last hash and the hashes of the other files. `legato sessions verify` finds a
-line or file that was changed or is missing.
+number of lines, the last hash and the hashes of the other files and of its own content. What it
+said when the session began is hashed in the first `session` line too (`head`). `legato sessions
+verify` finds a line or file that was changed, is missing or was added; only reports may be.
 """
 
 

@@ -5,6 +5,7 @@ The line is a bare DEALER that only knows JSON-RPC: it counts what is answered, 
 
 import json
 import os
+import re
 import secrets
 import signal
 import socket
@@ -21,6 +22,7 @@ from tests.system.line import Line
 
 LINES = ("requests", "events", "stop")
 PORTS = range(15_000, 32_000)
+TIMES = re.compile(r", (\d+) times$")
 LOOK_S = 0.5  # between two looks at whether it still runs
 SERVE = ("-m", "legato", "serve", "--config")
 LEASHED = ("-m", "legato.cli.leash", "serve", "--config")
@@ -167,6 +169,18 @@ class Attacked:
             if line.startswith(b"{") and line.endswith(b"\n"):
                 found.append(json.loads(line))
         return [line for line in found if event in (None, line.get("event"))]
+
+    def turned_away(self) -> int:
+        """Return how many refusals at the door its log tells of; one line may be of many."""
+        found = (TIMES.search(line["why"]) for line in self.logged("turned_away"))
+        return sum(int(times[1]) if times else 1 for times in found)
+
+    def turned_away_after(self, refusals: int, within_s: float = 10.0) -> int:
+        """Return the same once it is more than `refusals`: a line may be a second late."""
+        give_up = time.monotonic() + within_s
+        while (found := self.turned_away()) <= refusals and time.monotonic() < give_up:
+            time.sleep(0.05)
+        return found
 
     def said(self) -> list[str]:
         """Return what it wrote that is no log line: a traceback, a library's complaint."""

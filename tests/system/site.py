@@ -104,8 +104,8 @@ def browser() -> Iterator[Browser]:
 
 
 @contextmanager
-def page_of(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
-    """Give a page that has heard of the cell; errors of its scripts fail the test."""
+def page_of(browser: Browser, url: str, line: str = "up", **options: Any) -> Iterator[Page]:
+    """Give a page whose line stands as told; errors of its scripts fail the test."""
     context = browser.new_context(**{"viewport": {"width": 1280, "height": 900}} | options)
     context.set_default_timeout(20_000)
     errors: list[str] = []
@@ -113,7 +113,7 @@ def page_of(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.add_init_script(LOOK)
     page.goto(url)
-    page.locator("body[data-line=up]").wait_for(state="attached")
+    page.locator(f"body[data-line={line}]").wait_for(state="attached")
     try:
         yield page
         assert errors == []

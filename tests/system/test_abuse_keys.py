@@ -1,5 +1,6 @@
 """Strangers at the encrypted sockets of the real daemon: refused by name, and told nothing."""
 
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -33,14 +34,22 @@ def test_a_stranger_is_told_and_comes_no_further(
     None of them waits for a time-out, and the log has each.
     """
     running, keys = cell
-    before = len(running.logged("turned_away"))
+    before = running.turned_away()
     refused(running.lines[where], who, keys, events=where == "events")
-    for _ in range(200):
-        if len(running.logged("turned_away")) > before:
-            break
-        with Client(running.lines["requests"], keys=keys) as anna:
-            assert anna.call("ping")["state"] == "idle"
-    assert len(running.logged("turned_away")) > before
+    with Client(running.lines["requests"], keys=keys) as anna:
+        assert anna.call("ping")["state"] == "idle"
+    assert running.turned_away_after(before) > before
+
+
+def test_many_strangers_do_not_fill_the_log(cell: tuple[Attacked, Keys]) -> None:
+    """Thirty in a row are thirty in the log, in a few lines."""
+    running, keys = cell
+    before, lines = running.turned_away(), len(running.logged("turned_away"))
+    began = time.monotonic()
+    for _ in range(30):
+        refused(running.lines["requests"], "unlisted", keys)
+    assert running.turned_away_after(before + 29) >= before + 30
+    assert len(running.logged("turned_away")) - lines <= 3 * (time.monotonic() - began + 2)
 
 
 @pytest.mark.parametrize("where", LINES)

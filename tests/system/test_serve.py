@@ -13,6 +13,7 @@ import pytest
 import zmq
 
 from legato.records.chain import verify_chain
+from legato.records.record import read_session
 from tests.system.process import ANY, Daemon, configuration, daemon
 
 RUN = ["capture", "calibrate", "verify", "move_home", "massage_7", "massage_67", "massage_127",
@@ -190,13 +191,16 @@ def test_kill_and_restart_is_a_fault_without_motion(tmp_path: Path) -> None:
         assert verify_chain(record).ok
 
 
-def test_sigterm_retracts_and_ends_cleanly(tmp_path: Path) -> None:
-    """Told to end in a pass, the daemon stops the job first and exits with 0."""
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_signal_retracts_and_ends_cleanly(tmp_path: Path, name: str) -> None:
+    """Told to end in a pass, be it by a terminal that goes, it stops the job and exits with 0."""
     config = configuration(tmp_path, seed=1, time_scale=20.0)
     with daemon(config) as running:
         session = running.do("run")["session"]
-        running.event("state", state="massage_7")
-        os.kill(running.process.pid, signal.SIGTERM)
+        running.event("contact", station_mm=7.0)
+        os.kill(running.process.pid, signal.SIGUSR1)  # somebody's slip: nothing ends
+        os.kill(running.process.pid, signal.Signals[name])
         assert running.process.wait(20.0) == 0
-    meta = json.loads((tmp_path / "state" / "sessions" / session / "session.json").read_text())
-    assert meta["outcome"] == "stopped"
+    record = read_session(tmp_path / "state" / "sessions" / session)
+    assert (record.meta["outcome"], record.meta["reason"]) == ("stopped", f"asked for by {name}")
+    assert list(record.trajectory["why"])[-1] == "retract"

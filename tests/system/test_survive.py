@@ -152,6 +152,8 @@ def test_a_log_that_nobody_reads_holds_nobody_up(tmp_path: Path) -> None:
         os.close(send)
         line, stops = Line(lines["requests"]), Line(lines["stop"])
         try:
+            while line.do("status")["uptime_s"] < 1.0:  # until it has said that it listens
+                time.sleep(0.05)
             for _ in range(1000):  # far more than the pipe's 64 kB of log
                 line.send("session", session="x" * 128)
             assert line.drain(30.0) == []

@@ -150,6 +150,8 @@ def test_a_failed_picking_is_repaired_by_clicks(tmp_path: Path, browser: Browser
         with page_of(browser, served.url) as page:
             page.get_by_role("button", name="Run").click()
             until_state(page, "fault")
+            expect(page.locator("#kind")).to_have_text("Simulated arm")  # its camera is a real one
+            expect(page).to_have_title("Fault \u2013 legato (simulated arm)")
             fault = page.get_by_role("region", name="marks_not_found")
             expect(fault).to_contain_text("two legs are in sight")
             expect(page.get_by_role("button", name="Mark by hand")).to_have_count(0)  # not in fault
@@ -160,7 +162,7 @@ def test_a_failed_picking_is_repaired_by_clicks(tmp_path: Path, browser: Browser
             point_at(page, marks)
             page.get_by_role("button", name=f"Send {len(marks)} marks").click()
             expect(page.locator("#picture svg .seen")).to_have_count(len(marks))
-            expect(page.locator("#picture")).to_contain_text("Accepted")
+            expect(page.locator("#picture")).to_contain_text("Accepted by the picture")
             until_state(page, "idle")
             assert page.evaluate("document.activeElement !== document.body")
             expect(page.locator("#known")).to_contain_text("Calibrationnot verified")
@@ -220,6 +222,8 @@ def test_a_daemon_that_dies_under_the_page_is_missed_and_found_again(
             served.process.kill()
             page.locator("body[data-line=cut]").wait_for(state="attached")
             expect(page.get_by_role("region", name="Connection")).to_contain_text("server")
+            old = re.compile(r"is old: the last was heard at \d\d:\d\d:\d\d UTC\.")
+            expect(page.get_by_role("region", name="Connection")).to_contain_text(old)
             expect(page.locator("#state")).to_have_text("No connection")
             expect(page.locator("#hardware")).to_be_visible()
 

@@ -21,6 +21,15 @@ CHECK = """async () => (await axe.run(document, {
 WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 
 
+# The boxes of the names over the picture, in its px, and the size of the picture.
+NAMES = """() => {
+    const svg = document.querySelector('#picture svg');
+    const boxes = [...svg.querySelectorAll('text')].map((t) => [t.textContent, t.getBBox()]);
+    return [boxes.map(([text, b]) => [text, b.x, b.y, b.x + b.width, b.y + b.height]),
+        [svg.viewBox.baseVal.width, svg.viewBox.baseVal.height]];
+}"""
+
+
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Daemon, Site]]:
     """Give a daemon that has found the leg, and a page server."""
@@ -50,6 +59,26 @@ def test_axe_finds_nothing_serious_and_nothing_is_cut_off(
         until_state(page, "idle")
 
 
+@pytest.mark.parametrize("width", SIZES)
+def test_every_name_in_the_picture_can_be_read(
+    running: tuple[Daemon, Site], browser: Browser, width: int
+) -> None:
+    """None is cut off at the picture's edge, none lies over another."""
+    _, served = running
+    view = {"width": width, "height": SIZES[width]}
+    with page_of(browser, served.url, viewport=view) as page:
+        expect(page.locator("#picture svg text")).to_have_count(14)
+        names, (w, h) = page.evaluate(NAMES)
+    for name, left, top, right, bottom in names:
+        assert left >= 0 and top >= 0 and right <= w and bottom <= h, name  # noqa: PT018
+    for one, left, top, right, bottom in names:
+        for other, a, b, c, d in names:
+            # A line's box is taller than its letters: a fifth may be shared.
+            slack = 0.2 * (bottom - top)
+            apart = right <= a or c <= left or bottom - slack <= b or d - slack <= top
+            assert one == other or apart, (one, other)
+
+
 def test_a_page_without_the_token_says_why_it_cannot_act(
     running: tuple[Daemon, Site], browser: Browser
 ) -> None:
@@ -61,6 +90,7 @@ def test_a_page_without_the_token_says_why_it_cannot_act(
         page.keyboard.press("Escape")
         expect(page.locator("#urgent")).to_contain_text("open the address with the token")
         assert page.locator("#alerts").get_by_text("only looks on").is_visible()
+        assert page.locator("#alerts").get_by_text("use the hardware stop").is_visible()
 
 
 def test_the_keyboard_reaches_everything_and_stop_comes_first(

@@ -90,8 +90,11 @@ def test_what_the_daemon_refuses_is_told_with_its_reason(running: tuple[Daemon, 
     for method, body, wanted in (
         ("shutdown", {}, 404), ("lease", {}, 404), ("run", [], 400),
         ("calibrate", {"picks": {}}, 409), ("calibrate", picks, 409), ("run", {"x": 1}, 409),
+        ("home", {"method": "x"}, 400), ("home", {"self": 1}, 400), ("run", {"expires_at": 1}, 400),
+        ("stop", {"timeout_s": "long"}, 400), ("end_campaign", {}, 409),
     ):  # fmt: skip
-        assert ask(served, "POST", f"/api/act/{method}", body, Authorization=key)[0] == wanted
+        status, told, _ = ask(served, "POST", f"/api/act/{method}", body, Authorization=key)
+        assert (status, bool(told["reason"])) == (wanted, True)
     assert ask(served, "POST", "/api/act/run", "x" * 100_000, Authorization=key)[0] == 413
 
 

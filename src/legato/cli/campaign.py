@@ -2,12 +2,14 @@
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from legato.cli.chosen import quiet
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit, Failure, exit_of
 from legato.cli.follow import LISTEN_S, Interrupts, ask_stop, interrupts
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
 CLOCK = re.compile(r"(\d{1,2}):(\d{2})")
 SHOWN = ("campaign", "fault")
+COMPLETED = 100  # the latest so many
 
 
 @command("campaign")
@@ -66,8 +69,21 @@ def campaign(context: Context, end: bool, no_wait: bool, until: str | None, **as
         context.end(code or failed)
 
 
+def completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
+    """Return the campaigns that begin so, newest first, for a shell."""
+    from legato.cli.store import opened_store
+    from legato.daemon.campaign_files import CampaignFiles
+
+    del param
+    with suppress(Exception):  # a shell waits for words, and shows no error
+        store = opened_store(quiet(ctx), ctx.params.get("state_dir"))
+        heads = CampaignFiles(store.state_dir).heads(COMPLETED)
+        return [str(h["id"]) for h in heads if str(h["id"]).startswith(incomplete)]
+    return []
+
+
 @command("campaigns")
-@click.argument("campaign", required=False)
+@click.argument("campaign", required=False, shell_complete=completed)
 @state_dir_option
 @click.option("--limit", type=click.IntRange(min=1), default=20, show_default=True)
 def campaigns(context: Context, campaign: str | None, state_dir: Path | None, limit: int) -> None:
@@ -111,6 +127,7 @@ def follow(client: "Client", name: str, out: Output) -> dict[str, Any]:
             _listen(client, name, out, heard, stopping=stopping)
             told = client.call("status").get("campaign") or {}
             if told.get("id") != name or told.get("ended") is not None:
+                _listen(client, name, out, heard, stopping=True)  # what is still on its way
                 return dict(client.call("campaigns", campaign=name))
 
 

@@ -35,11 +35,15 @@ def place_for(out: Path) -> Path:
     return out
 
 
+def quiet(ctx: click.Context) -> Context:
+    """Return what a command would be given, for a shell that completes its words."""
+    return Context(ctx.params.get("config"), Output(), Services())
+
+
 def completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
     """Return the ids that begin so, newest first, for a shell; none where records are not found."""
     del param
-    given = Context(ctx.params.get("config"), Output(), Services())
     with suppress(Exception):  # a shell waits for words, and shows no error
-        found = opened_store(given, ctx.params.get("state_dir")).sessions()
+        found = opened_store(quiet(ctx), ctx.params.get("state_dir")).sessions()
         return [s.id for s in found if s.id.startswith(incomplete)]
     return []

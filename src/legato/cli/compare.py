@@ -10,6 +10,8 @@ from legato.cli.command import Context, command
 from legato.cli.exits import Exit, Failure
 from legato.cli.store import opened_store, state_dir_option
 
+MOST = 20  # differences shown here
+
 if TYPE_CHECKING:
     from legato.records.store import Store
     from legato.report.compare import Comparison
@@ -75,7 +77,7 @@ def show(context: Context, found: "Comparison") -> None:
     out.table(
         ("no.", "session", "job", "outcome", "cell", "wall s", "rms px", "1 sigma mm", "true mm"),
         [
-            (s.number, s.id, s.job, s.outcome, "simulated" if s.simulated else "real",
+            (s.number, s.id, s.job, s.outcome, s.cell,
              s.seconds, s.rms_px, s.sigma_mm, s.error_mm)
             for s in found.sides
         ],
@@ -94,5 +96,7 @@ def show(context: Context, found: "Comparison") -> None:
         out.say(f"leg found, sd: {shift} mm along x y z, {turn} deg about them")
     if found.differences:
         out.say("")
-        keys = [(d.key, *d.values) for d in found.differences[:20]]
-        out.table(("different", *(str(s.number) for s in found.sides)), keys)
+        out.table(("different", "value, sessions"),
+                  [(d.key, d.told()) for d in found.differences[:MOST]])  # fmt: skip
+        if len(found.differences) > MOST:
+            out.say(f"and {len(found.differences) - MOST} more: the page has them all")

@@ -1,5 +1,6 @@
 """The console script: nothing is imported before a Ctrl-C can be met in one line."""
 
+import os
 import sys
 from collections.abc import Callable, Sequence
 
@@ -11,6 +12,20 @@ def load() -> Callable[[], object]:
     return main
 
 
+def whole_streams() -> None:
+    """Give the process the standard streams that it was begun without.
+
+    Else a lock or a socket would get their numbers, and what is written there would go into it.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    sys.stdout = sys.stdout or os.fdopen(1, "w", closefd=False)
+    sys.stderr = sys.stderr or os.fdopen(2, "w", closefd=False)
+
+
 def run(
     load: Callable[[], Callable[[], object]] = load, arguments: Sequence[str] | None = None
 ) -> None:
@@ -18,6 +33,7 @@ def run(
 
     `arguments`, by default the process's own, say whether stdout is to hold a JSON document.
     """
+    whole_streams()
     try:
         load()()
     except KeyboardInterrupt:

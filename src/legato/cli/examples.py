@@ -105,10 +105,17 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
 
 def write_examples(ctx: click.Context, formatter: click.HelpFormatter) -> None:
     """Write the examples of a context's command, where it has any, as a section of its help."""
-    found = EXAMPLES.get(" ".join(ctx.command_path.split()[1:]), ())
+    found = EXAMPLES.get(" ".join(_names(ctx)), ())
     if not found:
         return
     with formatter.section("Examples"):
         for line, what in found:
             formatter.write(f"{'':>{formatter.current_indent}}{line}\n")
             formatter.write(f"{'':>{formatter.current_indent}}    {what}\n")
+
+
+def _names(ctx: click.Context) -> list[str]:
+    """Return the command's own names, whatever the program was called by."""
+    if ctx.parent is None:
+        return []
+    return [*_names(ctx.parent), str(ctx.info_name)]

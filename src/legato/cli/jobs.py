@@ -59,6 +59,8 @@ def start(
     out.document(answer)
     reason = f": {answer['reason']}" if answer.get("reason") else ""
     out.say(f"{name}: {answer['outcome']}{reason}")
+    if answer["outcome"] == "refused":
+        out.say(f"  what to do: `legato report {session}` tells it for each test that failed")
     code = exit_of(answer["outcome"])
     if code != Exit.DONE:
         context.end(code)

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from legato.cli.command import Context, command
-from legato.cli.exits import Exit
+from legato.cli.exits import Exit, Failure
 from legato.cli.line import LEASE, connected
 
 if TYPE_CHECKING:
     from legato.daemon.client import Client
 
+SIGNALLED = 128  # a shell's code for a command that a signal has ended, less the signal's number
 RENEWALS = 3.0  # a lease is renewed so often before it would end
 
 
@@ -27,7 +28,9 @@ def lease(context: Context, deadman: bool, seconds: float, words: tuple[str, ...
     """Keep the cell for COMMAND while it runs: others may read and stop, nothing else.
 
     COMMAND has the lease's token in LEGATO_LEASE: what `legato` is asked for in it is asked for
-    under the lease. Its exit code is this one's. Without COMMAND the lease is kept until Ctrl-C.
+    under the lease. This one ends with COMMAND's exit code, but with 1 where the lease was lost and
+    COMMAND ended with 0, and with 2 where COMMAND cannot be run. Without COMMAND the lease is kept
+    until Ctrl-C.
     """
     with connected(context) as client:
         held = _Held(client, seconds, deadman=deadman)
@@ -68,13 +71,23 @@ class _Held:
 def _while_held(context: Context, held: _Held, words: tuple[str, ...]) -> int:
     """Run a command, or wait for Ctrl-C, and renew the lease meanwhile; return the exit code."""
     if words:
-        with subprocess.Popen(words, env=os.environ | {LEASE: str(held.token)}) as child:
+        with _begun(words, held) as child:
             lost = _kept(context, held, lambda seconds: _ended(child, seconds))
-            return child.wait() or lost
+            code = child.wait() or lost
+            return code if code >= 0 else SIGNALLED - code
     context.output.document({"lease": held.token})
     context.output.say(f"{LEASE}={held.token}")
     context.output.note("kept until Ctrl-C")
     return _kept(context, held, _interrupted)
+
+
+def _begun(words: tuple[str, ...], held: _Held) -> "subprocess.Popen[bytes]":
+    try:
+        return subprocess.Popen(words, env=os.environ | {LEASE: str(held.token)})
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        hint = "give a program as you would to the shell, with its arguments"
+        raise Failure(f"cannot run {words[0]!r}: {reason}", Exit.USAGE, hint) from error
 
 
 def _kept(context: Context, held: _Held, ended: Callable[[float], int | None]) -> int:

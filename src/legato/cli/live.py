@@ -66,6 +66,10 @@ class Live:
             return "lost"
         return "stale" if now - self.heard_at > STALE_S else "live"
 
+    def upto(self, now: float) -> float:
+        """Return until when the cell's state is known: now, or when it was last heard of."""
+        return now if self.link(now) == "live" else max(self.heard_at or 0.0, self.since)
+
     def silent_s(self, now: float) -> float:
         """Return for how long nothing was heard."""
         return now - self.heard_at if self.heard_at is not None else 0.0
@@ -144,6 +148,8 @@ class Live:
         """Take that the cell is in a state."""
         if state == self.state:
             return
+        if self.state == "idle" and self.ended:
+            self.progress = {}  # of a job that has ended
         if self.state is not None:
             self.stays[self.state] = self.stays.get(self.state, 0.0) + now - self.since
         self.state, self.since = state, now

@@ -20,7 +20,7 @@ REACHES = (0.5, 1.0, 2.0, 5.0, 10.0, 1e9)  # what a scale may span either way, m
 UNKNOWN = "-"
 
 
-def states(live: Live, now: float) -> RenderableType:
+def states(live: Live, now: float) -> Panel:
     """Return the daemon's states, the present one lit, with how long each lasted."""
     table = Table.grid(padding=(0, 1), expand=True)
     table.add_column(no_wrap=True)
@@ -28,7 +28,9 @@ def states(live: Live, now: float) -> RenderableType:
     for name in live.states:
         if name == live.state:
             style = "bold white on red" if name == "fault" else "bold white on blue"
-            table.add_row(Text(f"> {name}", style), Text(f"{now - live.since:.1f} s", "bold"))
+            table.add_row(
+                Text(f"> {name}", style), Text(f"{live.upto(now) - live.since:.1f} s", "bold")
+            )
         elif name in live.stays and name != "idle":
             table.add_row(Text(f"* {name}"), f"{live.stays[name]:.1f} s")
         else:
@@ -36,7 +38,7 @@ def states(live: Live, now: float) -> RenderableType:
     return boxed(table, "state" if live.pace is None or steady(live) else "state, wall seconds")
 
 
-def arm(live: Live) -> RenderableType:
+def arm(live: Live) -> Panel:
     """Return arm, camera and calibration, a line for each figure."""
     told, table = live.status.get("arm") or {}, _named()
     table.add_row("arm", _arm(told))
@@ -57,7 +59,7 @@ def arm(live: Live) -> RenderableType:
     return boxed(table, "arm and camera")
 
 
-def arm_in_short(live: Live) -> RenderableType:
+def arm_in_short(live: Live) -> Panel:
     """Return the same in five lines, for a small terminal."""
     told, table = live.status.get("arm") or {}, _named()
     pitch, roll = (_figure(told.get(k), ".0f") for k in ("pitch_deg", "roll_deg"))
@@ -72,7 +74,7 @@ def arm_in_short(live: Live) -> RenderableType:
     return boxed(table, "arm and camera")
 
 
-def contacts(live: Live) -> RenderableType:
+def contacts(live: Live) -> Panel:
     """Return each station's contacts: the last over the predicted surface, on a scale."""
     if not live.contacts:
         return boxed(Text("none in this session", "dim"), "contacts")

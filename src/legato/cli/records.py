@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from legato.cli.chosen import completed
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit, Failure
 from legato.cli.store import opened_store, state_dir_option
@@ -17,13 +18,13 @@ if TYPE_CHECKING:
 
 
 @command("verify")
-@click.argument("ids", nargs=-1, metavar="[ID]...")
+@click.argument("ids", nargs=-1, metavar="[ID]...", shell_complete=completed)
 @state_dir_option
 def verify(context: Context, ids: tuple[str, ...], state_dir: Path | None) -> None:
     """Hold records to their hashes: those with these IDs, or all of them.
 
     The first line of events.jsonl that is changed, missing or out of order is named, and every
-    file that is changed or missing. Ends with 1 where anything is.
+    file that is changed, missing or was added. Ends with 1 where anything is.
     """
     from legato.records.whole import verify_record
 
@@ -49,7 +50,7 @@ def _say_verified(context: Context, report: "RecordReport") -> None:
 
 
 @command("replay")
-@click.argument("id_", metavar="[ID]", required=False)
+@click.argument("id_", metavar="[ID]", required=False, shell_complete=completed)
 @state_dir_option
 def replay(context: Context, id_: str | None, state_dir: Path | None) -> None:
     """Let the record of session ID, or the latest, drive its job again; compare every decision.

@@ -5,15 +5,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from legato.cli.chosen import completed
 from legato.cli.command import Context, command
 from legato.cli.examples import write_examples
 from legato.cli.exits import EPILOG
 from legato.cli.records import replay, verify
 from legato.cli.store import opened_store, state_dir_option
 from legato.report.clock import day
+from legato.report.devices import REAL, SIMULATED, cell
 
 if TYPE_CHECKING:
     from legato.records.record import SessionRecord
+    from legato.records.store import Store, Summary
 
 
 class Sessions(click.Group):
@@ -48,8 +51,16 @@ def sessions() -> None:
     """
 
 
+def completed_first(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
+    """Return the commands and ids that begin so: a shell asks `show`, which is meant by none."""
+    group = ctx.parent.command if ctx.parent is not None else None
+    names = [*group.commands] if isinstance(group, Sessions) else []
+    named = [name for name in names if name.startswith(incomplete)]
+    return named + completed(ctx, param, incomplete)
+
+
 @command("show")
-@click.argument("session", required=False)
+@click.argument("session", required=False, shell_complete=completed_first)
 @state_dir_option
 @click.option("--limit", type=click.IntRange(min=1), default=20, show_default=True)
 def listed(context: Context, session: str | None, state_dir: Path | None, limit: int) -> None:
@@ -61,8 +72,10 @@ def listed(context: Context, session: str | None, state_dir: Path | None, limit:
     found = store.sessions()[:limit]
     keys = ("id", "job", "started", "ended", "outcome", "reason", "cause", "simulated")
     out.document([{key: getattr(s, key) for key in keys} for s in found])
+    if out.as_json:
+        return  # a list that is as long again, for nobody
     rows = [
-        (s.id, day(s.started) or s.started, s.job, s.outcome or "open", _kind(s.simulated),
+        (s.id, day(s.started) or s.started, s.job, s.outcome or "open", kind(store, s),
          s.reason or "")
         for s in found
     ]  # fmt: skip
@@ -97,8 +110,18 @@ def states_of(record: "SessionRecord") -> list[str]:
     return [str(s) for s in found]
 
 
-def _kind(simulated: bool) -> str:
-    return "simulated" if simulated else "real"
+def kind(store: "Store", session: "Summary") -> str:
+    """Return what kind of cell a session was of, which its session.json says in full."""
+    from legato.records.chain import SESSION
+    from legato.records.errors import RecordError
+    from legato.records.files import read_object
+
+    if not session.simulated:
+        return REAL
+    try:
+        return cell(read_object(store.folder / session.id / SESSION))
+    except (FileNotFoundError, RecordError):
+        return SIMULATED
 
 
 for item in (listed, verify, replay):

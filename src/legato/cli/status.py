@@ -6,6 +6,7 @@ from typing import Any
 from legato.cli.command import Context, command
 from legato.cli.exits import Exit
 from legato.cli.line import connected
+from legato.report.devices import cell
 
 
 @command("status")
@@ -24,7 +25,10 @@ def rows(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
     arm, camera = answer.get("arm") or {}, answer.get("camera") or {}
     clock = " by the cell's clock" if answer.get("simulated") else ""
     found = [
-        ("state", str(answer.get("state")) + (" (simulated)" if answer.get("simulated") else "")),
+        (
+            "state",
+            str(answer.get("state")) + (f" ({cell(answer)})" if answer.get("simulated") else ""),
+        ),
         ("session", _session(answer)),
         ("arm", _arm(arm)),
         ("camera", _camera(camera, clock)),

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from legato.cli.live import Live
+    from legato.cli.output import Output
     from legato.daemon.client import Client
 
     Listen = Callable[[Client, Live, Callable[[], None]], None]
@@ -52,11 +53,16 @@ def watch(context: Context, lines: bool, every: bool, count: int | None) -> None
 
 def each_line(context: Context, client: "Client", every: bool, count: int | None) -> None:
     """Print events as they come, for people with when they were heard and the cell's clock."""
-    out, seen = context.output, 0
+    from legato.cli.live import STALE_S
+
+    out, seen, heard, silent = context.output, 0, time.monotonic(), False
     if not out.as_json:
         out.note("heard at, the cell's clock in s, topic, what happened; the first may be older")
     while True:
         for topic, event in client.events(LISTEN_S):
+            heard = time.monotonic()
+            if silent:
+                silent = tell_link(out, "live", "the daemon is heard again")
             if topic in QUIET and not every:
                 continue
             out.line({"topic": topic, **event})
@@ -66,6 +72,17 @@ def each_line(context: Context, client: "Client", every: bool, count: int | None
             seen += 1
             if seen == count:
                 return
+        quiet = time.monotonic() - heard
+        if quiet > STALE_S and not silent:
+            silent = tell_link(out, "stale", f"nothing heard of the daemon for {quiet:.0f} s")
+
+
+def tell_link(out: "Output", link: str, text: str) -> bool:
+    """Say a line of the link itself, which no daemon tells; True where the daemon is silent."""
+    out.line({"topic": "link", "link": link, "text": text})
+    if not out.as_json:
+        out.say(f"{time.strftime('%H:%M:%S')} {'':>12} {'link':<9} {text}")
+    return link != "live"
 
 
 def endpoint(context: Context) -> str:

@@ -131,6 +131,7 @@ def cell_settings(loaded: Loaded) -> CellSettings:
     """Return all that a procedure is told of the cell."""
     config = loaded.config
     known = known_intrinsics(loaded)
+    drivers = (("arm", config.robot.driver), ("camera", config.camera.driver))
     return CellSettings(
         leg=leg(config),
         stations=tuple(config.leg.stations_mm),
@@ -148,7 +149,7 @@ def cell_settings(loaded: Loaded) -> CellSettings:
         calibration=config.calibration,
         engine=engine_settings(config),
         massage=config.massage,
-        simulated=config.robot.driver == "sim",
+        simulated_devices=tuple(name for name, driver in drivers if driver == "sim"),
         camera_dated_s=loaded.intrinsics.dated().timestamp()
         if known and loaded.intrinsics
         else None,

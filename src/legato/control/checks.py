@@ -97,7 +97,7 @@ def _misfit(calibration: Calibration) -> Check:
     value, most = goodness(calibration.problem, calibration.solution)
     return limit(
         "noise", value, most, "",
-        f"the residuals' chi-square is {value:.3g}; noise alone stays under {most:.3g}",
+        f"the residuals' chi-square, which noise alone keeps under the limit, is {value:.3g}",
         "see that the marks lie where [leg.marks] says, and that the intrinsics are this camera's; "
         "marks pasted less exactly than calibration.pixel_sigma says need a larger one",
     )  # fmt: skip
@@ -164,9 +164,8 @@ def _camera(calibration: Calibration) -> Check | None:
         return None
     return limit(
         "camera", doubt.gain, doubt.limit, "",
-        f"another camera (alpha {100.0 * (doubt.alpha - 1.0):+.1f} %) would fit better by "
-        f"{max(doubt.gain, 0.0):.1f} in chi-square and move the worst station by "
-        f"{doubt.moved_mm:.2f} mm",
+        f"another camera (alpha {100.0 * (doubt.alpha - 1.0):+.1f} %) would move the worst station "
+        f"by {doubt.moved_mm:.2f} mm and fit better by {max(doubt.gain, 0.0):.1f} in chi-square",
         "calibrate the camera anew (legato intrinsics): focus, zoom or lens may have changed",
     )  # fmt: skip
 

@@ -145,8 +145,14 @@ class CellSettings:
     calibration: CalibrationSettings
     engine: EngineSettings
     massage: MassageSettings
-    simulated: bool
+    simulated_devices: tuple[str, ...]
+    """Of arm and camera, those that are no real ones."""
     camera_dated_s: float | None = None
     """When the known intrinsics were made, s since 1970; None where there are none."""
     camera_days: float = float("inf")
     """How many days they hold."""
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the arm or the camera is no real one."""
+        return bool(self.simulated_devices)

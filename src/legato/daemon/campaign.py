@@ -224,10 +224,11 @@ class Campaign:
 def told_of(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return what status tells of a campaign that is over, from its summary."""
     names = ("id", "job", "by", "session", "done", "failed", "total", "outcome", "reason", "ended")
-    used = len(document.get("resets_done", ()))
+    tried, allowed = document.get("resets_done"), document.get("resets")
+    used = len(tried) if isinstance(tried, list) else 0
     return {name: document.get(name) for name in names} | {
         "underway": False,
         "next_in_s": None,
         "resets": used,
-        "resets_left": document.get("resets", 0) - used,
+        "resets_left": allowed - used if isinstance(allowed, int) else 0,
     }

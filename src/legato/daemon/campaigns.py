@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from legato.control.states import FAULT, IDLE
 from legato.daemon.campaign import RESET, START, Campaign, Rule, told_of
-from legato.daemon.campaign_files import CampaignFiles
+from legato.daemon.campaign_files import LOOKED_AT, CampaignFiles
 from legato.daemon.journal import Journal
 from legato.daemon.log import Log
 from legato.daemon.sessions import Session, Sessions
@@ -29,6 +29,7 @@ AGAIN_S: Final = 1.0  # wall s before the disk is asked again
 SHOWN: Final = 200  # sessions in an answer: a message has an end
 FROZEN_S: Final = 30.0  # without a look, asleep or stopped: who comes back may find a person there
 NEAR_S: Final = (0.02, 1.0)
+ASKED: Final = ("job", "count", "every_s", "for_s", "until", "resets")  # what a key stands for
 
 
 @dataclass
@@ -72,18 +73,31 @@ class Campaigns:
         if request.campaign is None:
             return {"campaigns": self._heads(request.limit)}
         current = self.current
-        known = current is not None and current.id == request.campaign
-        found = current.document() if current and known else self.files.read(request.campaign)
+        if current is not None and current.id == request.campaign:
+            rows = current.sessions
+            left_out = max(len(rows) - SHOWN, 0)
+            return current.document() | {"sessions": rows[-SHOWN:], "left_out": left_out}
+        found = self.files.shown(request.campaign, SHOWN)
         if found is None:
             raise Failure("invalid_params", f"there is no campaign {request.campaign!r}")
-        rows = found.get("sessions", [])
-        return found | {"sessions": rows[-SHOWN:], "left_out": max(len(rows) - SHOWN, 0)}
+        return found
 
-    def with_key(self, key: str) -> str | None:
-        """Return the id of the campaign that a key has started."""
-        if self.current is not None and self.current.key == key:
-            return self.current.id
-        return next((str(h["id"]) for h in self._heads(None) if h.get("key") == key), None)
+    def with_key(self, asked: requests.Campaign) -> str | None:
+        """Return the id of the campaign that a request's key has started.
+
+        Raises Failure where another campaign was asked for with it.
+        """
+        current = self.current
+        if current is not None and current.key == asked.key:
+            found = current.document()
+        else:
+            found = next((h for h in self._heads(None) if h["key"] == asked.key), {})
+        for name in ASKED if found else ():
+            if found.get(name) != getattr(asked, name):
+                was = f"{name} {found.get(name)}, not {getattr(asked, name)}"
+                reason = f"this key has started campaign {found['id']} with {was}"
+                raise Failure("invalid_params", reason, "use a new key for each campaign")
+        return found.get("id")
 
     def need_none(self, what: str) -> None:
         """Raise Failure while a campaign is under way."""
@@ -229,13 +243,13 @@ class Campaigns:
     def _latest(self) -> dict[str, Any] | None:
         """Return what status tells of the last campaign of an earlier daemon."""
         with suppress(RecordError):
-            found = next(map(self.files.read, self.files.ids()[:1]), None)
-            return told_of(found) if found is not None else None
+            latest = map(self.files.read, self.files.ids()[:LOOKED_AT])
+            return next((told_of(found) for found in latest if found is not None), None)
         return None
 
     def _heads(self, limit: int | None) -> list[dict[str, Any]]:
         try:
-            return self.files.heads(limit if limit is not None else len(self.files.ids()))
+            return self.files.heads(limit)
         except RecordError as error:
             self.log.error("campaigns_not_read", text=error.text, hint=error.hint)
             return []

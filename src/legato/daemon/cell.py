@@ -42,11 +42,6 @@ class Cell:
     witness: Witness | None = None
     stands_at: ToolPose | None = None
 
-    @property
-    def simulated(self) -> bool:
-        """Whether no real arm moves."""
-        return self.arm.simulated
-
 
 def build_clock(loaded: "Loaded") -> Clock:
     """Return the cell's time: faster than the wall only where arm and camera are simulated."""

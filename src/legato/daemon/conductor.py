@@ -18,7 +18,7 @@ from legato.daemon.admission import (
     need_worker,
 )
 from legato.daemon.campaigns import campaigns_of
-from legato.daemon.closing import LET_GO_S, TOLD, Closing
+from legato.daemon.closing import LET_GO_S, Closing
 from legato.daemon.faulting import Faulting
 from legato.daemon.journal import Journal
 from legato.daemon.lease import Leases
@@ -41,7 +41,6 @@ from legato.daemon.standing import Setting, Standing
 from legato.daemon.tasks import Tasks
 from legato.daemon.waiters import DEVICES, What
 from legato.geometry.motion import ToolPose
-from legato.hal.faults import Cause
 from legato.records.errors import RecordError
 from legato.records.store import Store
 from legato.wire.jsonrpc import Failure
@@ -156,7 +155,7 @@ class Conductor:
     def shutdown(self, by: str | None = None) -> None:
         """Begin to end: a running job retracts first."""
         if self._closing is None:
-            self._closing = Closing(self._orders, self.standing.now)
+            self._closing = Closing(self._orders)
             self.campaigns.end("interrupted", "the daemon was told to end")
             if self.standing.sessions.current is not None and self.state != FAULT:
                 self.stop(by)
@@ -294,7 +293,7 @@ class Conductor:
     def _close(self, closing: Closing, now: float) -> None:
         """Go on ending: wait for the job, then for the worker, neither for ever."""
         running = self.standing.sessions.current is not None
-        if closing.gives_up(now, running=running):
-            self._settle_session(self.standing.end("interrupted", TOLD, Cause.INTERRUPTED))
+        if running and self.state == FAULT:  # nothing more of it is sent, and nobody waits for it
+            self._settle_session(self.standing.end_in_fault())
             running = False
         self.finished = self.finished or closing.over(now, running=running)

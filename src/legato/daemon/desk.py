@@ -11,7 +11,7 @@ from msgspec import Raw
 
 from legato.control.settings import CellSettings
 from legato.control.table import CAMPAIGN, JOBS, METHODS, READERS, admit, authorise
-from legato.daemon.asked import params_of, pose_of
+from legato.daemon.asked import in_time, params_of, pose_of
 from legato.daemon.conductor import Conductor
 from legato.daemon.events import Events
 from legato.daemon.log import Log
@@ -120,7 +120,7 @@ class Desk:
     def close(self) -> None:
         """Answer all that still wait: the daemon ends."""
         for waiter in self._waiters.take_all():
-            if _is_session(waiter.what):
+            if waiter.what[0] == "session":
                 self._reply(waiter.ask, self._wait_told(str(waiter.what[1])))
             else:
                 self._refuse(waiter.ask, Failure("unavailable", "the daemon is shutting down"))
@@ -155,11 +155,11 @@ class Desk:
             if known is not None:
                 return self._repeated(call.method, known)
         if isinstance(request, Campaign) and request.key is not None:
-            begun = self._conductor.campaigns.with_key(request.key)
+            begun = self._conductor.campaigns.with_key(request)
             if begun is not None:
                 return {"campaign": begun, "session": None, "state": self._conductor.state}
         if isinstance(request, Acting):
-            self._in_time(request, now)
+            in_time(request, now)
             self._conductor.leases.check(request.lease, ask.who, now)
         if call.method in NEED_DEVICES and not self._conductor.devices_known:
             patience = JOB_WAIT_S if call.method in STARTS else TASK_S
@@ -170,12 +170,6 @@ class Desk:
         if no is not None and not ends:
             raise Failure(no.code, no.reason, no.hint)
         return self._done(ask, request, now)
-
-    def _in_time(self, request: Acting, now: float) -> None:
-        """Raise Failure where a request has come too late to be what its sender wants."""
-        if request.expires_at is not None and now > request.expires_at:
-            late = now - request.expires_at
-            raise Failure("expired", f"it came {late:.3f} s after its expires_at", "ask again")
 
     def _done(self, ask: Ask, request: Request, now: float) -> Result | None:
         """Carry out an admitted request."""
@@ -218,8 +212,10 @@ class Desk:
             case Estop():
                 conductor.estop(by)
             case Reset():
+                self._need_room()
                 return self._later(ask, ("task", conductor.reset(by)), now + TASK_S)
             case Reference():
+                self._need_room()
                 token = conductor.reference(pose_of(request, self._settings))
                 return self._later(ask, ("task", token), now + TASK_S)
             case Lease():
@@ -242,16 +238,20 @@ class Desk:
         return self._events.seq, conductor.standing.views, conductor.gate.number, self._acts
 
     def _later(self, ask: Ask, what: What, due: float) -> Result | None:
-        """Let a request wait."""
-        if self._waiters.full:
-            raise Failure("unavailable", "too many requests wait", "ask again later")
+        """Let a request wait; raises Failure."""
+        self._need_room()
         self._waiters.add(ask, what, due)
         return None
+
+    def _need_room(self) -> None:
+        """Raise Failure where no more requests may wait."""
+        if self._waiters.full:
+            raise Failure("unavailable", "too many requests wait", "ask again later")
 
     def _out_of_time(self, waiter: Waiter) -> None:
         """Answer a request whose time is up."""
         what = waiter.what
-        if _is_session(what):
+        if what[0] == "session":
             self._reply(waiter.ask, self._wait_told(str(what[1])))
             return
         if what != DEVICES:
@@ -296,7 +296,3 @@ class Desk:
         )  # fmt: skip
         if not call.notification:
             self._send(refuse(call.route, call.id, failure, state))
-
-
-def _is_session(what: What) -> bool:
-    return what[0] == "session"

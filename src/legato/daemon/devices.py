@@ -4,6 +4,7 @@ An arm is referenced as long as its registers are what they were when it last wa
 they read, nobody knows where it stands.
 """
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -53,6 +54,8 @@ class Devices:
         """Open both anew where they do not answer; tries both, then raises the first error."""
         if self._arm_connected:
             self._try_arm()
+        if self._camera_connected:
+            self._try_camera()
         problems = self.open()
         if problems:
             raise problems[0]
@@ -188,6 +191,10 @@ class Devices:
             self.read()
         except DeviceError:
             self.cell.arm.close()
+
+    def _try_camera(self) -> None:
+        with suppress(DeviceError):
+            self.grab()
 
     def _take(self, reading: ArmReading) -> None:
         """Keep a reading; registers that changed by themselves put the position in doubt."""

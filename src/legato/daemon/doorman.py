@@ -5,8 +5,10 @@ reads no disk: the keys are those that it was made with.
 """
 
 import threading
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from math import ceil, inf
 from typing import Final
 
 import zmq
@@ -15,7 +17,8 @@ from zmq.utils.monitor import recv_monitor_message
 
 from legato.daemon.keys import Keys
 from legato.daemon.mailbox import Bell
-from legato.daemon.messages import Message, TurnedAway
+from legato.daemon.messages import Message
+from legato.daemon.refusals import Refusals
 from legato.daemon.who import NOBODY, Who
 
 ZAP: Final = "inproc://zeromq.zap.01"
@@ -36,6 +39,7 @@ class Doorman:
         self._clients = dict(clients)
         self._by_name = {who.name: who for who in clients.values()}
         self._post = post
+        self._refusals = Refusals()
         self._bell = Bell()
         self._ended = False
         self._door: zmq.Socket[bytes] | None = None
@@ -85,13 +89,15 @@ class Doorman:
             watched = list(self._watched)
             for monitor in watched:
                 poller.register(monitor, zmq.POLLIN)
-            heard = dict(poller.poll())
+            heard = dict(poller.poll(self._patience_ms()))
             self._bell.silence()
             if self._door in heard:
                 self._door.send_multipart(self._answer(self._door.recv_multipart()))
             for monitor in watched:
                 if monitor in heard:
                     self._turned_away(monitor)
+            self._tell_due(time.monotonic())
+        self._tell_due(inf)
 
     def _answer(self, request: list[bytes]) -> list[bytes]:
         """Return the answer to an authentication request, whatever it is."""
@@ -100,11 +106,25 @@ class Doorman:
         who = self._clients.get(key) if (mechanism, domain) == (b"CURVE", DOMAIN) else None
         if who is not None:
             return [version, number, b"200", b"OK", who.name.encode(), b""]
-        why = f"key {key.decode()} is not listed" if key else "no key"
-        self._post(TurnedAway(address.decode("ascii", "replace"), why))
+        kind, why = ("key", f"key {key.decode()} is not listed") if key else ("none", "no key")
+        self._refuse(address.decode("ascii", "replace"), kind, why)
         return [version, number, b"400", b"key refused", b"", b""]
 
     def _turned_away(self, monitor: "zmq.Socket[bytes]") -> None:
         event = recv_monitor_message(monitor)
         why = "not encrypted, or with another server key"
-        self._post(TurnedAway(event["endpoint"].decode("ascii", "replace"), why))
+        self._refuse(event["endpoint"].decode("ascii", "replace"), "handshake", why)
+
+    def _refuse(self, address: str, kind: str, why: str) -> None:
+        told = self._refusals.take(address, kind, why, time.monotonic())
+        if told is not None:
+            self._post(told)
+
+    def _tell_due(self, now: float) -> None:
+        for told in self._refusals.take_due(now):
+            self._post(told)
+
+    def _patience_ms(self) -> int | None:
+        """Return how long nobody has to come before there is something to tell."""
+        due = self._refusals.next_due()
+        return None if due == inf else max(ceil((due - time.monotonic()) * 1000.0), 0)

@@ -47,6 +47,10 @@ class Faulting:
     def see_disk(self) -> None:
         """Go to fault where the disk did not take a record."""
         error = self._journal.take_error()
-        if error is not None and self.to_come is None:
+        if error is None or self.to_come is not None:
+            return
+        if self._standing.state == STOPPING:
+            self.to_come = reports.disk(error)  # the way off the leg that is under way goes on
+        else:
             self.fail_after_retreat(reports.disk(error))
-            self._journal.take_error()
+        self._journal.take_error()

@@ -142,9 +142,32 @@ def _check_mode(file: Path, key: str, forbidden: int, expected: str, hint: str) 
         raise ConfigError(
             file, key, str(file), f"a file that can be read: {error.strerror}", HINT
         ) from error
-    # The folder of systemd's credentials is closed to others, whatever its files' bits say.
-    if mode & forbidden and file.parent != _credentials():
+    if mode & forbidden and not _closed(file.parent):
         raise ConfigError(file, key, f"mode {mode:04o}", expected, hint)
+
+
+def is_closed(mode: int, owner: int, group: int, us: int) -> bool:
+    """Say whether a folder of this mode is closed to all but root and `us`.
+
+    Where an access list lets us in, as systemd's may, the folder is root's, and the bits of its
+    group, which is root's too, show what the list allows.
+    """
+    roots = (owner, group) == (0, 0)
+    return owner in (0, us) and not mode & (0o027 if roots else 0o077)
+
+
+def _closed(folder: Path) -> bool:
+    """Say whether a folder is that of systemd's credentials, and as closed as systemd makes it.
+
+    Then its files' bits do not matter.
+    """
+    if folder != _credentials():
+        return False
+    try:
+        found = folder.stat()
+    except OSError:
+        return False
+    return is_closed(found.st_mode, found.st_uid, found.st_gid, os.geteuid())
 
 
 def _credentials() -> Path | None:

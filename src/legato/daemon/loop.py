@@ -59,12 +59,13 @@ class Loop:
         self._mail = mailbox.fileno()
         self._poller.register(self._mail, zmq.POLLIN)
 
-    def run(self, end: Callable[[], bool] = lambda: False) -> None:
-        """Serve until the conductor has finished; once `end()` says so, the end begins."""
+    def run(self, end: Callable[[], str | None] = lambda: None) -> None:
+        """Serve until the conductor has finished; once `end()` names who wants it, it begins to."""
         while not self._conductor.finished:
             self.turn()
-            if end():
-                self._conductor.shutdown()
+            by = end()
+            if by is not None:
+                self._conductor.shutdown(by)
 
     def turn(self) -> None:
         """Wait for what comes next, and handle it: one request, and all else that has come."""

@@ -6,7 +6,7 @@ are read before the first client is answered.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final
 
@@ -43,6 +43,7 @@ def arm_name(robot: "RobotTable") -> str | None:
 def read_past(store: Store, log: Log, *, arm: str | None) -> Past:
     """Return what there was, after closing what was left open. Raises RecordError.
 
+    A disk that takes nothing keeps no daemon from starting: what it should hold is tried again.
     `arm` names the real arm of this cell, None where it is simulated: a simulated world begins
     anew with each process, and nothing of its arm outlives it.
     """
@@ -52,14 +53,32 @@ def read_past(store: Store, log: Log, *, arm: str | None) -> Past:
     fault = _fault(state.get("fault"))
     if open_ones:
         fault = _interrupted(open_ones[0])
-        # Before the sessions are closed: else a start that fails later would lose it.
-        store.save_state({**state, "fault": fault})
-    for summary in open_ones:
-        store.close_interrupted(summary.id)
-        log.warning("interrupted", session=summary.id, job=summary.job)
+        _close(store, log, {**state, "fault": fault}, open_ones)
     close_interrupted(CampaignFiles(store.state_dir), log)
     last = _arms_place(state) if arm is not None and arm == state.get("arm") else (None, None)
-    return Past(fault, store.sessions(LATEST) if open_ones else summaries, last, arm)
+    return Past(fault, [_ended(s) for s in summaries], last, arm)
+
+
+def _close(store: Store, log: Log, state: Mapping[str, Any], open_ones: Sequence[Summary]) -> None:
+    """Keep the fault, then give each session its outcome, as far as the disk takes them."""
+    try:
+        # Before the sessions are closed: else a start that fails later would lose it.
+        store.save_state(state)
+        for summary in open_ones:
+            store.close_interrupted(summary.id)
+    except RecordError as error:
+        log.error("sessions_not_closed", text=error.text, hint=error.hint)
+    for summary in open_ones:
+        log.warning("interrupted", session=summary.id, job=summary.job)
+
+
+def _ended(summary: Summary) -> Summary:
+    """Return a session that has an outcome, interrupted where its daemon gave it none."""
+    if summary.outcome is not None:
+        return summary
+    report = reports.interrupted(summary.id, summary.job)
+    cause = str(report.cause)
+    return replace(summary, outcome="interrupted", reason=report.text, cause=cause)
 
 
 def read_older(store: Store, log: Log) -> Sequence[Summary]:

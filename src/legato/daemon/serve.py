@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 
 SWITCH_S = 0.0005  # Python's own thread switch: the loop answers while the worker computes
 JOIN_S = 5.0
+ENDING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
+IGNORED = (signal.SIGUSR1, signal.SIGUSR2)
 
 
 def serve(loaded: "Loaded", log: Log | None = None, procedures: "Procedures | None" = None) -> int:
@@ -125,7 +127,7 @@ def _serve(loaded: "Loaded", store: Store, log: Log, procedures: "Procedures | N
         with _signals(mailbox, watching.stopping) as ending:
             worker.start()
             try:
-                loop.run(lambda: bool(ending))
+                loop.run(lambda: ending[0] if ending else None)
             except BaseException:
                 orders.drop()  # a bug in the loop must not leave the arm moving on
                 raise
@@ -191,15 +193,21 @@ def _conductor(
 
 
 @contextmanager
-def _signals(mailbox: Mailbox, told: Callable[[], None]) -> Iterator[list[int]]:
-    """Collect SIGTERM and SIGINT in a list, each waking the loop after `told` was called."""
-    came: list[int] = []
+def _signals(mailbox: Mailbox, told: Callable[[], None]) -> Iterator[list[str]]:
+    """Collect the names of ENDING in a list, each waking the loop after `told` was called.
+
+    What else ends a process by default ends nothing: the arm might be on the leg.
+    """
+    came: list[str] = []
 
     def collect(number: int, frame: Any) -> None:  # noqa: ARG001  # the signature is signal's
-        came.append(number)
+        came.append(signal.Signals(number).name)
         told()
 
-    before = {n: signal.signal(n, collect) for n in (signal.SIGTERM, signal.SIGINT)}
+    before = {n: signal.signal(n, collect) for n in ENDING}
+    before |= {n: signal.signal(n, signal.SIG_IGN) for n in IGNORED}
+    if before[signal.SIGHUP] == signal.SIG_IGN:  # nohup
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
     wake = signal.set_wakeup_fd(mailbox.wake_fileno(), warn_on_full_buffer=False)
     try:
         yield came

@@ -167,6 +167,7 @@ class Standing:
             "params": params,
             **part,
             "simulated": self._setting.settings.simulated,
+            "simulated_devices": list(self._setting.settings.simulated_devices),
             "versions": dict(versions),
         }
         session = self.sessions.begin(job, key, meta)

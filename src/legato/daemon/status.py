@@ -55,6 +55,7 @@ def status_told(
         "version": __version__,
         "boot": None,
         "simulated": settings.simulated,
+        "simulated_devices": list(settings.simulated_devices),
         "state": state,
         "session": session.id if session else None,
         "station": station_of(state, settings.stations),

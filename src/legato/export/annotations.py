@@ -45,7 +45,7 @@ def annotations(moment_ns: int, scene: Scene, solved: Mapping[str, Any]) -> "Ima
         )
         for name, (u, v) in found.items()
     ]
-    return ImageAnnotations(points=shapes, texts=words)
+    return ImageAnnotations(timestamp=stamp(moment_ns), points=shapes, texts=words)
 
 
 def _points(

@@ -24,6 +24,7 @@ from legato.geometry.transforms import Array, rotation_from_vector, transform
 from legato.records.errors import RecordError
 from legato.records.files import read_bytes
 from legato.records.record import SessionRecord
+from legato.report.posed import posed
 from legato.report.scene import leg_of, scene_of, stations_of
 
 EVENT_SCHEMA = {
@@ -97,6 +98,7 @@ def write_mcap(record: SessionRecord, stream: IO[bytes]) -> Counter[str]:
     """Write a session to a stream as MCAP; returns how many messages each topic has."""
     from mcap.writer import Writer
 
+    record = posed(record)
     line, model = time_line(record), recorded_arm(record)
     writer = Writer(stream)
     writer.start(profile="", library="legato")

@@ -117,9 +117,9 @@ def _first_break(lines: list[bytes], seal: dict[str, Any] | None) -> tuple[int, 
     """Return the number of the first changed or missing line within the chain, and a sentence."""
     hashes = ["", *(digest(line) for line in lines)]
     events = [decode_line(line) for line in lines]
-    vouched = {after["previous"] for _, after in pairwise(events) if after is not None}
+    vouched = {str(after["previous"]) for _, after in pairwise(events) if after is not None}
     if seal is not None:
-        vouched.add(seal.get("last"))
+        vouched.add(str(seal.get("last")))
     for number, event in enumerate(events, start=1):
         if event is None:
             return number, f"line {number} is no event"
@@ -144,7 +144,9 @@ def _against_seal(
     """Return where a sound chain's end differs from its seal."""
     if seal is None:
         return None
-    count = int(seal.get("events", 0))
+    count = seal.get("events")
+    if not isinstance(count, int):
+        return max(len(lines), 1), f"nobody knows how many lines there were: {SESSION} is changed"
     if len(lines) < count:
         return len(lines) + 1, f"line {len(lines) + 1} is missing: the record ended with {count}"
     if len(lines) > count:

@@ -36,8 +36,8 @@ def _plain(value: Any) -> object:
     raise NotImplementedError(f"a record cannot hold a {type(value).__name__}")
 
 
-def read_bytes(path: Path) -> bytes:
-    """Return a file's content; raises FileNotFoundError, else RecordError."""
+def read_bytes(path: Path, size: int = -1) -> bytes:
+    """Return a file's content, or its first bytes; raises FileNotFoundError, else RecordError."""
     try:
         descriptor = os.open(path, os.O_RDONLY | NO_LINK)
     except FileNotFoundError:
@@ -45,8 +45,14 @@ def read_bytes(path: Path) -> bytes:
     except OSError:
         with told("read", path):
             raise
-    with told("read", path), os.fdopen(descriptor, "rb") as file:
-        return file.read()
+    with told("read", path):
+        try:
+            if size >= 0:
+                return os.read(descriptor, size)
+            with open(descriptor, "rb", closefd=False) as file:
+                return file.read()
+        finally:
+            os.close(descriptor)
 
 
 def read_object(path: Path) -> dict[str, Any]:

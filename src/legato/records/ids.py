@@ -16,19 +16,35 @@ def session_id(started: str, token: str) -> str:
 
 
 def began(session: str) -> datetime:
-    """Return the second at which a session began, as its id tells it."""
-    return datetime.strptime(session.partition("-")[0], "%Y%m%dT%H%M%S%z")
+    """Return the second at which a session began, as its id tells it; raises ValueError."""
+    return datetime.fromisoformat(session.partition("-")[0])
+
+
+def is_id(text: str) -> bool:
+    """Say whether `text` is a session id, of a time that there is."""
+    if SESSION_ID.fullmatch(text) is None:
+        return False
+    try:
+        began(text)
+    except ValueError:
+        return False
+    return True
 
 
 def moment(iso: str) -> datetime:
     """Return an ISO time in UTC; raises ValueError."""
     time = datetime.fromisoformat(iso)
-    return time.astimezone(UTC) if time.tzinfo else time.replace(tzinfo=UTC)
+    if time.tzinfo is None:
+        return time.replace(tzinfo=UTC)
+    try:
+        return time.astimezone(UTC)
+    except OverflowError as error:
+        raise ValueError(f"{iso} is before or after all time") from error
 
 
 def checked_id(text: str) -> str:
     """Return `text` where it is a session id; no path gets through here."""
-    if not SESSION_ID.fullmatch(text):
+    if not is_id(text):
         raise RecordError(
             f"{text!r} is no session id", "ids look like 20261122T014700Z-5f3a: `legato sessions`"
         )

@@ -11,6 +11,7 @@ from typing import Any
 from legato.records.chain import EFFECTS, EVENTS, SESSION, digest, event_line
 from legato.records.errors import RecordError, told
 from legato.records.files import LineFile, encode, make_folder, replace_file, sync_folder
+from legato.records.head import begun_digest, head_digest
 from legato.records.ids import checked_name
 from legato.records.trajectory import header_line, row_line
 
@@ -36,6 +37,7 @@ class SessionWriter:
         self._seq = 0
         self._last = ""
         self._open = True
+        self._headed = False  # a line has the digest of session.json
         self._placed = False  # for good: the folder's own entry is on the disk
 
     def event(
@@ -43,10 +45,13 @@ class SessionWriter:
     ) -> int:
         """Append one event and return its number; with `durable` it is on the disk by then.
 
-        `t` is monotonic s, `wall` an ISO time in UTC.
+        `t` is monotonic s, `wall` an ISO time in UTC. The first `session` has `head` besides, what
+        session.json is held to.
         """
         with self._lock:
             self._needs_open()
+            if heads := kind == "session" and not self._headed:
+                data = dict(data) | {"head": begun_digest(self._meta)}
             line = event_line(self._seq + 1, wall, t, kind, data, self._last)
             before = self._seq
             try:
@@ -55,6 +60,7 @@ class SessionWriter:
                 # A line that stands in the file counts, even where it could not be made durable.
                 if self._events.lines > before:
                     self._seq, self._last = before + 1, digest(line)
+                    self._headed |= heads
             if durable and not self._placed:
                 # After the line: one commit of the file system's journal then serves both.
                 with told("write", self.path):
@@ -120,10 +126,10 @@ class SessionWriter:
                 "outcome": outcome,
                 "reason": reason,
                 "cause": cause,
-                "seal": {
-                    **{"events": self._seq, "last": self._last, "torn": 0},
-                    "files": self._files | whole,
-                },
+            }
+            meta["seal"] = {
+                **{"events": self._seq, "last": self._last, "torn": 0},
+                **{"files": self._files | whole, "head": head_digest(meta)},
             }
             replace_file(self.path / SESSION, encode(meta) + b"\n")
             self._meta = meta

@@ -7,7 +7,7 @@ import os
 import secrets
 import shutil
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from errno import EEXIST, ENOTEMPTY
@@ -25,7 +25,8 @@ from legato.records.files import (
     remove_folder,
     replace_file,
 )
-from legato.records.ids import SESSION_ID, began, checked_id, moment, session_id
+from legato.records.head import head_digest
+from legato.records.ids import began, checked_id, is_id, moment, session_id
 from legato.records.record import SessionRecord, read_session
 from legato.records.session import SessionWriter
 from legato.records.whole import file_hashes
@@ -126,19 +127,21 @@ class Store:
             "outcome": "interrupted",
             "reason": reason,
             "cause": "interrupted",
-            "seal": _seal(path) | {"files": file_hashes(path)},
         }
+        meta["seal"] = _seal(path) | {"files": file_hashes(path), "head": head_digest(meta)}
         replace_file(path / SESSION, encode(meta) + b"\n")
 
     def sweep(self, left: tuple[str, ...] = (BEGUN, PRUNED)) -> None:
         """Remove what an interrupted begin or prune left; only while no session can begin."""
-        if not self.folder.is_dir():
-            return
         with told("read", self.folder):
-            entries = list(os.scandir(self.folder))
+            entries = list(os.scandir(self.folder)) if self.folder.is_dir() else []
+        stuck: list[RecordError] = []
         for entry in entries:
             if entry.name.startswith(left) and entry.is_dir(follow_symlinks=False):
-                remove_folder(Path(entry.path))
+                with _noted(stuck):
+                    remove_folder(Path(entry.path))
+        if stuck:
+            raise stuck[0]
 
     def prune(
         self, keep_days: float, now: datetime, *, min_free_mb: float = 0.0, keep_newest: int = 0
@@ -147,10 +150,13 @@ class Store:
 
         Too old: ended more than `keep_days` before `now`. In the way: the oldest, as long as less
         than `min_free_mb` is free. A session without an outcome stays, and so do the `keep_newest`
-        latest, whatever the clock says, and all that ended within a day.
+        latest, whatever the clock says, and all that ended within a day. Raises RecordError once
+        all is done that could be.
         """
-        self.sweep((PRUNED,))
         removed: list[str] = []
+        stuck: list[RecordError] = []
+        with _noted(stuck):
+            self.sweep((PRUNED,))
         too_old, a_day_old = now - timedelta(days=keep_days), now - DAY
         short: bool | None = None  # unknown as long as nobody needs to know
         for path in sorted(self._paths(), reverse=True)[keep_newest:][::-1]:
@@ -166,9 +172,13 @@ class Store:
             if summary.outcome is None or not _older(summary, a_day_old):
                 continue
             if short or _older(summary, too_old):
-                self._remove(summary.id)
-                removed.append(summary.id)
+                with _noted(stuck):
+                    self._remove(summary.id)
+                    removed.append(summary.id)
                 short = None
+        if stuck:
+            others = f"; {len(removed)} others are removed" if removed else ""
+            raise RecordError(stuck[0].text + others, stuck[0].hint)
         return removed
 
     def _remove(self, session: str) -> None:
@@ -193,9 +203,9 @@ class Store:
     def free_mb(self) -> float:
         """Return the megabytes that may still be written under the state folder."""
         place = self.state_dir
-        while not place.exists() and place != place.parent:
-            place = place.parent
         with told("look at", place):
+            while not place.exists() and place != place.parent:
+                place = place.parent
             return shutil.disk_usage(place).free / 1e6
 
     def _path(self, session: str) -> Path:
@@ -213,7 +223,7 @@ class Store:
             except FileNotFoundError:
                 return
         for entry in entries:
-            if SESSION_ID.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False):
+            if is_id(entry.name) and entry.is_dir(follow_symlinks=False):
                 yield Path(entry.path)
 
     def _summary(self, path: Path) -> Summary:
@@ -223,14 +233,14 @@ class Store:
             meta = read_object(path / SESSION)
         return Summary(
             id=path.name,
-            job=str(meta.get("job", "unknown")),
-            started=str(meta.get("started", "")),
-            ended=meta.get("ended"),
-            outcome=meta.get("outcome"),
-            reason=meta.get("reason"),
-            cause=meta.get("cause"),
+            job=_text(meta.get("job", "unknown")) or "",
+            started=_text(meta.get("started")) or "",
+            ended=_text(meta.get("ended")),
+            outcome=_text(meta.get("outcome")),
+            reason=_text(meta.get("reason")),
+            cause=_text(meta.get("cause")),
             simulated=bool(meta.get("simulated", False)),
-            key=meta.get("key"),
+            key=_text(meta.get("key")),
         )
 
     def _meta_or_rest(self, path: Path) -> dict[str, Any]:
@@ -243,6 +253,15 @@ class Store:
             with told("move", path / SESSION):
                 (path / SESSION).rename(path / "session.damaged")
             return _stand_in(path)
+
+
+@contextmanager
+def _noted(errors: list[RecordError]) -> Iterator[None]:
+    """Keep a RecordError for later: one folder that cannot be removed keeps no other."""
+    try:
+        yield
+    except RecordError as error:
+        errors.append(error)
 
 
 def _stand_in(path: Path) -> dict[str, Any]:
@@ -258,8 +277,13 @@ def _seal(path: Path) -> dict[str, Any]:
         return seal_of([])
 
 
+def _text(value: object) -> str | None:
+    """Return what belongs into a list; a value that is no text was not written by a daemon."""
+    return value if value is None or isinstance(value, str) else "unreadable"
+
+
 def _older(summary: Summary, limit: datetime) -> bool:
-    """Say whether a session ended before `limit`; one whose time cannot be read did not."""
+    """Say whether a session ended before `limit`; its id tells where its time cannot be read."""
     with suppress(ValueError):
         return moment(summary.ended or summary.started) < limit
-    return False
+    return began(summary.id) < limit

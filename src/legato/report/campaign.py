@@ -14,6 +14,7 @@ from legato.report.html import environment, number, shown_day
 
 TEMPLATE = "compare.html.j2"
 Figures = list[tuple[str, str]]  # names and text
+PLACED = ("leg from", "turn from")
 SIDE_BY_SIDE = 4  # with more sessions than these each has a row instead of a column
 
 
@@ -34,6 +35,9 @@ def content(found: Comparison, records: Sequence[SessionRecord]) -> dict[str, An
     """Return everything that the template shows, by name."""
     columns = len(found.sides) <= SIDE_BY_SIDE
     rows, alike = (side_rows(found), []) if columns else apart(side_rows(found))
+    # Poses of many sessions have a table of their own, beside their figure.
+    placed = [] if columns else [[f for f in row if f[0].startswith(PLACED)] for row in rows]
+    rows = rows if columns else [[f for f in row if not f[0].startswith(PLACED)] for row in rows]
     return {
         "found": found,
         "tones": [facts.headline(record)["tone"] for record in records],
@@ -42,6 +46,8 @@ def content(found: Comparison, records: Sequence[SessionRecord]) -> dict[str, An
         "names": [name for name, _ in rows[0]],
         "rows": [[value for _, value in row] for row in rows],
         "alike": alike,
+        "placed_names": [name for name, _ in placed[0]] if placed else [],
+        "placed": [[value for _, value in row] for row in placed],
         "columns": columns,
         "contacts": campaign.contacts(found),
         "poses": campaign.poses(found),
@@ -70,7 +76,7 @@ def figures(side: Side) -> Figures:
         ("session", side.id),
         ("job", side.job),
         ("outcome", side.outcome or "none yet"),
-        ("cell", "simulated" if side.simulated else "real"),
+        ("cell", side.cell),
         ("began", shown_day(side.started) if side.started else number(None)),
         ("seconds by the wall", number(side.seconds, 1)),
         ("engine", side.engine or number(None)),

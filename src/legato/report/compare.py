@@ -12,10 +12,14 @@ import numpy as np
 from legato.geometry.transforms import Array, apply
 from legato.records.record import SessionRecord
 from legato.report import facts
+from legato.report.devices import cell
 from legato.report.figures.curves import Stay
+from legato.report.posed import posed
 from legato.report.score import Score, score
+from legato.report.touches import contacts, counted
 
 ABSENT = "\N{EN DASH}"
+LONGEST = 32  # characters of a value that is shown
 NOT_COMPARED = ("server.", "records.")  # where a daemon listens and writes changes nothing
 
 
@@ -40,6 +44,7 @@ class Side:
     outcome: str | None
     reason: str | None
     simulated: bool
+    cell: str
     started: str | None
     seconds: float | None
     engine: str | None
@@ -76,6 +81,14 @@ class Difference:
     key: str
     values: tuple[str, ...]
 
+    def told(self) -> str:
+        """Return each value once, cut where it is long, with the sessions that have it."""
+        numbers: dict[str, list[str]] = {}
+        for number, value in enumerate(self.values, start=1):
+            numbers.setdefault(value, []).append(str(number))
+        cut = {v: v if len(v) <= LONGEST else f"{v[: LONGEST - 1]}\u2026" for v in numbers}
+        return "; ".join(f"{cut[v]} ({', '.join(own)})" for v, own in numbers.items())
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -90,7 +103,7 @@ class Comparison:
     @property
     def mixed(self) -> bool:
         """Whether simulated and real sessions stand side by side."""
-        return len({side.simulated for side in self.sides}) > 1
+        return len({side.cell for side in self.sides}) > 1
 
     def as_json(self) -> dict[str, Any]:
         """Return it as JSON-able data."""
@@ -101,6 +114,7 @@ def compare(records: Sequence[SessionRecord]) -> Comparison:
     """Return sessions side by side; raises ValueError for fewer than two."""
     if len(records) < 2:
         raise ValueError("one session has nothing beside it: name two or more")
+    records = [posed(r) for r in records]
     scores = [score(r) for r in records]
     poses = _poses([(r.calibration or {}).get("world_from_object") for r in records])
     sides = [
@@ -124,7 +138,7 @@ def _side(number: int, record: SessionRecord, told: Score, pose: Pose | None) ->
     """Return one session's figures."""
     solved, meta = record.calibration or {}, record.meta
     sigmas = [s.get("sigma_mm") for s in solved.get("stations") or ()]
-    heights = [float(c["contact_mm"]) for c in facts.contacts(record)]
+    heights = [float(c["contact_mm"]) for c in counted(contacts(record))]
     stays: dict[str, float] = {}
     course = tuple(facts.stays(record))
     for stay in course:
@@ -136,6 +150,7 @@ def _side(number: int, record: SessionRecord, told: Score, pose: Pose | None) ->
         outcome=meta.get("outcome"),
         reason=meta.get("reason"),
         simulated=bool(meta.get("simulated")),
+        cell=cell(meta),
         started=meta.get("started"),
         seconds=facts.duration(record),
         engine=solved.get("engine"),
@@ -180,7 +195,7 @@ MIDDLE = np.array([97.0, 0.0, 0.0])  # about the middle of the stations, in the 
 
 def _stations(records: Sequence[SessionRecord]) -> tuple[Station, ...]:
     """Return every station that any session touched."""
-    touched = [[(float(c["station_mm"]), float(c["contact_mm"])) for c in facts.contacts(r)]
+    touched = [[(float(c["station_mm"]), float(c["contact_mm"])) for c in counted(contacts(r))]
                for r in records]  # fmt: skip
     places = sorted({station for strokes in touched for station, _ in strokes})
     return tuple(

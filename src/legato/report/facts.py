@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from legato.calibration.problem import PAPER_BOUNDS
-from legato.control.band import Band, band, bands
 from legato.geometry.transforms import Array
 from legato.records.chain import verify_chain
 from legato.records.errors import RecordError
 from legato.records.record import SessionRecord
 from legato.report.clock import cell_seconds, moment, pace
+from legato.report.devices import badge, cell, not_real
 from legato.report.figures.curves import Stay
 from legato.report.paper import TABLE_5_3
 from legato.report.scene import Scene
@@ -25,6 +25,7 @@ TONES = {"done": "good", "stopped": "calm", "refused": "warn", "fault": "bad", "
 UNITS = {"f": "mm", "s_x": "px/mm", "s_y": "px/mm", "u0": "px", "v0": "px"} | dict.fromkeys(
     ("t_x", "t_y", "t_z"), "mm"
 )
+UNITLESS = dict.fromkeys(("noise", "suspects", "camera"), "chi-square")
 APART = ("f", "s_x", "s_y")  # only f s_x = alpha_u and f s_y = alpha_v can be told
 STOPPED = {
     "converged": "stopped because the pose had converged",
@@ -44,6 +45,9 @@ def headline(record: SessionRecord) -> Row:
         "reasons": [r for r in str(record.meta.get("reason") or "").split("; ") if r],
         "cause": record.meta.get("cause"),
         "simulated": bool(record.meta.get("simulated")),
+        "badge": badge(record.meta),
+        "cell": cell(record.meta),
+        "no_real": not_real(record.meta),
         "seconds": duration(record),
         **clocks(record),
     }
@@ -88,17 +92,6 @@ def warnings(record: SessionRecord) -> list[str]:
     except RecordError as error:
         found.append(f"The event lines cannot be verified: {error.text}.")
     return found + [f"A part of the record cannot be read: {d}." for d in record.damage]
-
-
-def contact_bands(record: SessionRecord) -> dict[float, Band]:
-    """Return each station's band; of a station without an estimate the accepted one alone."""
-    window = ((record.meta.get("config") or {}).get("massage") or {}).get("contact_window_mm")
-    stations = (record.calibration or {}).get("stations") or ()
-    found = {b.station_mm: b for b in bands(stations, window)}
-    for row in contacts(record):
-        place = float(row["station_mm"])
-        found.setdefault(place, band(place, None, window))
-    return found
 
 
 def search(solved: Mapping[str, Any]) -> list[str]:
@@ -160,6 +153,7 @@ def parameters(solved: Mapping[str, Any]) -> list[Row]:
             {
                 **gene,
                 "value": None if known and name in APART else gene["value"],
+                "sigma": gene["sigma"] if gene["searched"] else None,
                 "low": low,
                 "high": high,
                 "on_bound": gene["on_bound"] and gene["searched"],
@@ -174,16 +168,20 @@ def parameters(solved: Mapping[str, Any]) -> list[Row]:
     return rows
 
 
+def checks(solved: Mapping[str, Any]) -> list[Row]:
+    """Return the tests of verify; a limit without a unit is one of chi-square."""
+    rows = [dict(check) for check in solved.get("checks") or ()]
+    for row in rows:
+        if not row.get("unit") and isinstance(row.get("limit"), int | float):
+            row["unit"] = UNITLESS.get(str(row.get("name")), "")
+    return rows
+
+
 def _product(solved: Mapping[str, Any], name: str) -> Row:
     """Return the row of a known camera's focal length in px."""
     nothing = dict.fromkeys(("sigma", "low", "high", "share", "paper"))
     flags = {"on_bound": False, "own_bounds": False, "searched": False}
     return {"name": name, "value": solved.get(name), "unit": "px", **nothing, **flags}
-
-
-def contacts(record: SessionRecord) -> list[Row]:
-    """Return each stroke's contact in order, with heights in the robot base frame."""
-    return [dict(e["data"]) for e in record.of_kind("contact")]
 
 
 def stays(record: SessionRecord) -> list[Stay]:
@@ -216,7 +214,8 @@ def profiles(
         height = offset @ np.asarray(surface["normal"], dtype=float)
         whys = path["why"][rows].copy()
         whys[0] = path["why"][stroke.first]  # the row before is where the stroke begins
-        found[stroke.station].append(_held(path["t"][rows] - stroke.began, height, whys))
+        times = np.maximum(path["t"][rows] - stroke.began, 0.0)
+        found[stroke.station].append(_held(times, height, whys))
     return {station: strokes for station, strokes in found.items() if strokes}
 
 
@@ -258,6 +257,14 @@ def told(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return "none" if value is None else str(value)
+
+
+def no_overlay(record: SessionRecord) -> str:
+    """Return why nothing is drawn over the picture."""
+    if record.calibration:
+        return "its size is not the calibration's"
+    sought = any(e["data"].get("state") == "calibrate" for e in record.of_kind("state"))
+    return "no pose was found in it" if sought else "no pose was found in it, as none was sought"
 
 
 def picture_path(record: SessionRecord, scene: Scene | None) -> str | None:

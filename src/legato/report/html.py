@@ -9,11 +9,14 @@ from legato.records.errors import told as told_error
 from legato.records.files import make_folder, replace_file
 from legato.records.record import SessionRecord
 from legato.report import facts, happened
+from legato.report.bands import bands_told, contact_bands, descent
 from legato.report.clock import day
 from legato.report.figures import canvas, closeups, curves, picture, space
 from legato.report.paper import PLACEMENT_ERROR_MM, POSES
+from legato.report.posed import pose_of, posed
 from legato.report.scene import Scene, scene_of
 from legato.report.score import score
+from legato.report.touches import contacts, counted, ended_by
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -60,7 +63,9 @@ def environment(**options: Any) -> "Environment":
 
 def content(record: SessionRecord) -> dict[str, Any]:
     """Return everything that the template shows, by name."""
+    record = posed(record)
     solved, scene = record.calibration or {}, scene_of(record)
+    touched = contacts(record)
     return {
         "id": record.id,
         "meta": record.meta,
@@ -72,8 +77,14 @@ def content(record: SessionRecord) -> dict[str, Any]:
         "remarks": [w for w in solved.get("warnings") or () if SAID not in w],
         "residuals": facts.residuals(solved),
         "parameters": facts.parameters(solved),
+        "checks": facts.checks(solved),
         "poses": POSES,
-        "contacts": facts.contacts(record),
+        "pose": pose_of(record),
+        "contacts": touched,
+        "bands_told": bands_told(contact_bands(record).values()),
+        "no_overlay": facts.no_overlay(record),
+        "strokes": len(counted(touched)),
+        "ended_by": ended_by(record),
         "sigma": {s["station_mm"]: s.get("sigma_mm") for s in solved.get("stations") or ()},
         "score": score(record),
         "paper_error": PLACEMENT_ERROR_MM,
@@ -105,14 +116,15 @@ def _pictures(record: SessionRecord, scene: Scene | None) -> dict[str, Any]:
             shown["marks"], shown["scale"] = picture.marks_overlay(scene, record.calibration or {})
             shown["close"] = closeups.marks(pixels, scene, record.calibration or {})
             if record.trajectory["t"].size:
-                touched = facts.contacts(record)
+                touched = contacts(record)
                 shown["way"] = picture.trajectory_overlay(scene, record.trajectory, touched)
     return shown
 
 
 def _figures(record: SessionRecord, scene: Scene | None) -> dict[str, str | None]:
     """Return each figure as a data URI, None where there is nothing to draw."""
-    solved, touched, stays = record.calibration or {}, facts.contacts(record), facts.stays(record)
+    solved, touched, stays = record.calibration or {}, contacts(record), facts.stays(record)
+    ended = ended_by(record)
     trace = solved.get("trace") or {}
     config = record.meta.get("config") or {}
     pressed, seconds = facts.profiles(record, solved), facts.clocks(record)["seconds_of"]
@@ -130,8 +142,8 @@ def _figures(record: SessionRecord, scene: Scene | None) -> dict[str, str | None
         )
         if record.trajectory["t"].size
         else None,
-        "heights": curves.contact_heights(touched, facts.contact_bands(record))
-        if touched
+        "heights": curves.contact_heights(touched, contact_bands(record), descent(record), ended)
+        if touched or ended
         else None,
         "press": curves.press_profiles(pressed, seconds) if pressed else None,
         "timeline": curves.timeline(stays) if stays else None,

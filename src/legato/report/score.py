@@ -15,6 +15,8 @@ from legato.geometry.transforms import angle_between
 from legato.records.record import SessionRecord
 from legato.report.scene import leg_of, stations_of
 from legato.report.strokes import Stroke, began, strokes_of
+from legato.report.touches import contacts as contacts_of
+from legato.report.touches import counted
 
 Happening = Mapping[str, Any]
 
@@ -91,7 +93,7 @@ def score(record: SessionRecord) -> Score:
         for touch in _of_session(record, truth.get("touches") or (), "began_s")
     ]
     touches = _first_touches(leg_of(record), met)
-    contacts = [e["data"] for e in record.of_kind("contact")]
+    contacts = counted(contacts_of(record))
     return Score(
         stations=tuple(_station(s, contacts, touches) for s in stations_of(record)),
         pose_error=_pose_error(record.calibration or {}, truth),
@@ -119,21 +121,27 @@ def _first_touches(
     leg: Leg, met: Sequence[tuple[Happening, Stroke | None]]
 ) -> tuple[TouchError, ...]:
     """Return each stroke's first touch with its distance from the station's place on the leg."""
-    first: dict[tuple[float, int], TouchError] = {}
+    first: dict[tuple[float, int], tuple[Stroke, TouchError]] = {}
     for touch, stroke in met:
-        if stroke is None or (stroke.station, stroke.number) in first:
+        if stroke is None:
             continue
+        known = first.get((stroke.station, stroke.number))
+        if known is not None and known[0] == stroke:
+            continue  # an attempt that a later one has replaced counts no more
         place = np.asarray(touch["object_mm"], dtype=float)
-        first[stroke.station, stroke.number] = TouchError(
-            station_mm=stroke.station,
-            stroke=stroke.number,
-            along_mm=float(place[0]),
-            across_mm=float(place[1]),
-            error_mm=float(np.linalg.norm(place - leg.surface_point(stroke.station))),
-            depth_mm=float(touch.get("depth_mm") or 0.0),
-            force_n=float(touch.get("force_n") or 0.0),
+        first[stroke.station, stroke.number] = (
+            stroke,
+            TouchError(
+                station_mm=stroke.station,
+                stroke=stroke.number,
+                along_mm=float(place[0]),
+                across_mm=float(place[1]),
+                error_mm=float(np.linalg.norm(place - leg.surface_point(stroke.station))),
+                depth_mm=float(touch.get("depth_mm") or 0.0),
+                force_n=float(touch.get("force_n") or 0.0),
+            ),
         )
-    return tuple(first.values())
+    return tuple(error for _, error in first.values())
 
 
 def _pose_error(calibration: Happening, truth: Happening) -> PoseError | None:

@@ -1,7 +1,8 @@
 """Strokes as the trajectory shows them: the fingertip below a station's approach height."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,19 +30,32 @@ class Stroke:
 
 
 def strokes_of(record: SessionRecord) -> list[Stroke]:
-    """Return every stroke in order, those broken off too; numbered from 1 at each station."""
+    """Return every stroke in order, those broken off too; numbered as the cell told them.
+
+    A stroke that was broken off and made again is there twice, under one number.
+    """
     path = record.trajectory
     found: list[Stroke] = []
     counts: dict[float, int] = {}
+    changes = [float(e["t"]) for e in record.of_kind("state")]
+    told = [e for e in record.of_kind("progress") if e["data"].get("stroke") is not None]
     for row, begins in _rows_at_leg(path["why"], path["station_mm"]):
         station, t = float(path["station_mm"][row]), float(path["t"][row])
         if begins or not found:
-            counts[station] = counts.get(station, 0) + 1
-            began = float(path["t"][row - 1]) if row else t - LONGEST_MOVE_S
-            found.append(Stroke(station, counts[station], began, t, row, row))
+            number = _told(told, station, t) or counts.get(station, 0) + 1
+            counts[station] = number
+            before = float(path["t"][row - 1]) if row else t - LONGEST_MOVE_S
+            entered = max((at for at in changes if at <= t), default=before)  # a pause is left out
+            found.append(Stroke(station, number, max(before, entered), t, row, row))
         else:
             found[-1] = replace(found[-1], ended=t, last=row)
     return found
+
+
+def _told(progress: Sequence[Mapping[str, Any]], station: float, t: float) -> int | None:
+    """Return the number of the stroke that the cell told last at a station, None without one."""
+    own = [e["data"] for e in progress if float(e["t"]) <= t]
+    return int(own[-1]["stroke"]) if own and own[-1].get("station_mm") == station else None
 
 
 def began(record: SessionRecord) -> float | None:

@@ -14,10 +14,12 @@ from legato.control.table import JOBS, ROLES, STOPS
 from legato.daemon.client import Client, DaemonUnavailable, RpcError
 from legato.daemon.keys import Keys
 
-ASKED: Final = (*JOBS, "pause", "resume", "reset", "reference")
+ASKED: Final = (*JOBS, "pause", "resume", "reset", "reference", "end_campaign")
 METHODS: Final = (*ASKED, *STOPS)
 LATE_S: Final = 3.0  # a click that the daemon cannot heed by then has lost its meaning
 THREADS: Final = 4
+# These are the server's own to say: how it calls, and how long anybody waits.
+OURS: Final = frozenset({"self", "method", "seconds", "expires_at", "timeout_s"})
 
 
 class Refused(Exception):
@@ -86,6 +88,8 @@ class Acts:
 
         Raises Refused.
         """
+        if mixed := sorted(OURS & params.keys()):
+            raise Refused(400, f"a page cannot give {', '.join(mixed)}", "leave it out")
         try:
             return self.line_of(method).ask(method, params, LATE_S if method in ASKED else None)
         except RpcError as error:

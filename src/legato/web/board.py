@@ -50,6 +50,7 @@ class Board:
     def lost(self, reason: str, hint: str, wall: str | None, stop: bool | None = None) -> None:
         """Take in that the daemon is not to be had; what is shown from now on is old.
 
+        `wall` is when it was heard last, None where it never was.
         `stop` says whether its stop line answers all the same, None where that is not known.
         """
         told = {"up": False, "since": wall, "reason": reason, "hint": hint, "stop": stop}

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from legato.daemon.client import Client, DaemonUnavailable, RpcError
+from legato.daemon.client import Client, DaemonUnavailable, KeyRefused, RpcError
 from legato.daemon.keys import Keys
 
 SILENT_S = 2.5  # heartbeats come every second: so long a silence is a daemon that has gone
@@ -86,6 +86,8 @@ class Feed:
             with Client(self._stop_line, timeout_s=self._waits[1], keys=self._keys) as client:
                 client.call("ping")
             self._stops = True
+        except KeyRefused:
+            self._stops = False  # no stop of ours is let in
         except RpcError:
             self._stops = True  # an answer all the same
         except DaemonUnavailable:
@@ -112,7 +114,7 @@ class Feed:
         self._post("described", client.call("describe"))
         status = client.call("status")
         self._stops = None
-        self._post("up", None)
         self._post("status", status)
+        self._post("up", None)  # what a page believes from now on is of now
         self._post("sessions", client.call("sessions", limit=PAST)["sessions"])
         return str(status["boot"])

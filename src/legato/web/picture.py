@@ -3,7 +3,7 @@
 All in px of the picture, from the record alone; nothing is found or solved here.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from legato.report.scene import Scene, scene_of, silhouette, surface_samples
 ARROW_PX = 38.0  # length of the longest residual as it is drawn
 SCALES = [m * 10.0**e for e in range(5) for m in (1, 2, 5)]
 KEPT = "start-calibrated.png"
+CAMERA = "camera"
 PNG = b"\x89PNG\r\n\x1a\n"
 SOLVED = (
     "accepted", "reasons", "rms_px", "engine", "agreement", "warnings", "missing", "suspects",
@@ -38,7 +39,7 @@ def view_of(record: SessionRecord) -> dict[str, Any] | None:
         "boot": record.meta.get("boot"),
         "job": record.meta.get("job"),
         "started": record.meta.get("started"),
-        "simulated": bool(record.meta.get("simulated")),
+        "simulated": bool(record.meta.get("simulated")) and CAMERA in _simulated(record),
         "name": name,
         "size": size,
         "solved": None,
@@ -123,6 +124,11 @@ def ring(scene: Scene, x: float) -> list[list[float] | None]:
     pixels = scene.pixels(scene.leg.surface_point(x, angle))
     seen = scene.visible(x, angle)
     return [_px(p) if s else None for p, s in zip(pixels, seen, strict=True)]
+
+
+def _simulated(record: SessionRecord) -> Sequence[str]:
+    """Return which devices were simulated; older records say only that both were."""
+    return record.meta.get("simulated_devices") or ("arm", CAMERA)
 
 
 def _px(pixel: Array) -> list[float] | None:

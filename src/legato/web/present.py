@@ -23,6 +23,10 @@ class Held:
         """The session that found the leg."""
         return None if self.calibration is None else self.calibration.get("session")
 
+    def if_heard(self, earlier: bool) -> bool | None:
+        """Return whether something is earlier, None where no daemon has been heard yet."""
+        return earlier if self.boot is not None else None
+
     @property
     def bands(self) -> list[Any] | None:
         """The stations' bands by control.band."""
@@ -30,8 +34,13 @@ class Held:
 
 
 def picture_told(view: Row | None, held: Held) -> dict[str, Any] | None:
-    """Return the newest picture; `earlier` where another process of the daemon took it."""
-    return None if view is None else {**view, "earlier": view["boot"] != held.boot}
+    """Return the newest picture; `earlier` where another process of the daemon took it.
+
+    `earlier` is None where no daemon has been heard: then nobody knows whose picture it is.
+    """
+    if view is None:
+        return None
+    return {**view, "earlier": held.if_heard(view["boot"] != held.boot)}
 
 
 def leg_told(solved: Row | None, held: Held) -> dict[str, Any] | None:
@@ -68,7 +77,8 @@ class Contacts:
 
     def told(self, held: Held) -> dict[str, Any]:
         """Return the section; with nothing touched yet the bands are those of the present pose."""
-        earlier = bool(self.rows) and (held.session is None or self.by != held.session)
+        older = held.session is None or self.by != held.session
+        earlier = held.if_heard(older) if self.rows else False
         bands = self.bands if self.rows else held.bands
         return {"session": self.session, "rows": self.rows, "bands": bands, "earlier": earlier}
 

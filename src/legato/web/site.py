@@ -25,8 +25,7 @@ class Site:
         self._reader = ThreadPoolExecutor(1, thread_name_prefix="records")
         self._reading: asyncio.Task[None] | None = None
         self._again = False
-        self._up = False
-        self._lost_at: str | None = None
+        self._heard_at: str | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def open(self) -> None:
@@ -49,17 +48,15 @@ class Site:
     def take(self, kind: str, what: Any) -> None:
         """Take in what the feed says."""
         wall = datetime.now(UTC).isoformat()
+        if kind != "lost":
+            self._heard_at = wall
         match kind:
             case "up":
-                self._up = True
                 self._board.up(wall)
                 self._read_soon()
             case "lost":
-                # The moment at which it was lost stays; only the reason may change.
-                if self._up:
-                    self._up, self._lost_at = False, wall
                 reason, hint, stop = what
-                self._board.lost(reason, hint, self._lost_at, stop)
+                self._board.lost(reason, hint, self._heard_at, stop)
             case "described":
                 self._board.described(what)
             case "status":

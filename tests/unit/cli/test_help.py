@@ -81,3 +81,38 @@ def test_sessions_are_completed_by_their_ids(tmp_path: Path) -> None:
     environment = {"COMP_WORDS": words, "COMP_CWORD": "4", "_LEGATO_COMPLETE": "bash_complete"}
     found = click.testing.CliRunner().invoke(main, prog_name="legato", env=environment)
     assert found.output.splitlines() == ["plain,20261122T050151Z-1005"]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("sessions ", {"show", "verify", "replay", "20261122T050151Z-1005"}),
+        ("sessions 2026", {"20261122T050151Z-1005"}),
+        ("sessions ver", {"verify"}),
+        ("sessions verify 2026", {"20261122T050151Z-1005"}),
+        ("sessions replay ", {"20261122T050151Z-1005"}),
+        ("campaigns ", {"c-1"}),
+    ],
+)
+def test_records_are_completed_wherever_one_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, expected: set[str]
+) -> None:
+    """`sessions` completes its commands and the ids that stand for `show`; campaigns their own."""
+    state = tmp_path / ".local" / "state" / "legato"
+    (state / "sessions" / "20261122T050151Z-1005").mkdir(parents=True)
+    heads = [{"id": "c-1"}]
+    monkeypatch.setattr("legato.daemon.campaign_files.CampaignFiles.heads", lambda *_: heads)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    line = f"legato {words}"
+    environment = {"COMP_WORDS": line, "COMP_CWORD": str(line.count(" ")),
+                   "_LEGATO_COMPLETE": "bash_complete"}  # fmt: skip
+    found = click.testing.CliRunner().invoke(main, prog_name="legato", env=environment)
+    assert {row.partition(",")[2] for row in found.output.splitlines()} == expected
+
+
+def test_examples_stand_in_the_help_however_the_program_was_called() -> None:
+    """`python -m legato status --help` shows what `legato status --help` does."""
+    called = click.testing.CliRunner().invoke(
+        main, ["status", "--help"], prog_name="python -m legato"
+    )
+    assert "legato status --json | jq .state" in called.output

@@ -52,6 +52,12 @@ def test_a_command_has_the_token_and_its_code_is_the_end(cell: Path) -> None:
     assert daemon.closed
 
 
+def test_a_command_that_a_signal_has_ended_has_a_shells_code(cell: Path) -> None:
+    """A terminated command gives 128 and the signal's number."""
+    words = python("import os, signal; os.kill(os.getpid(), signal.SIGTERM)")
+    assert run("lease", "--config", cell, *words, daemon=Leased()).exit_code == 143
+
+
 def test_it_is_renewed_while_the_command_runs(cell: Path) -> None:
     """Three times in each of its lives."""
     daemon = Leased()
@@ -64,21 +70,23 @@ def test_it_is_renewed_while_the_command_runs(cell: Path) -> None:
 
 
 def test_a_lease_that_is_lost_is_told_and_not_given_back(cell: Path) -> None:
-    """The command goes on to its end; then this one has failed."""
+    """The command goes on to its end; then this one has failed, as its help says."""
     daemon = Leased()
     daemon.renewals = 0
     words = python("import time; time.sleep(0.6)")
     result = run("lease", "--seconds", "1", "--config", cell, *words, daemon=daemon)
     assert result.exit_code == Exit.FAILED
+    assert "with 1 where the lease was lost" in run("lease", "--help").output
     assert "the lease is lost: expired (-32006): this lease has ended" in result.stderr
     assert daemon.asked[-1][1]["duration_s"] == 1.0
 
 
 def test_a_command_that_is_none_gives_the_lease_back(cell: Path) -> None:
-    """Nobody is kept out for nothing."""
+    """Nobody is kept out for nothing; the line says what could not be run, and why."""
     daemon = Leased()
     result = run("lease", "--config", cell, "/no/such/command", daemon=daemon)
-    assert result.exit_code == Exit.FAILED
+    assert result.exit_code == Exit.USAGE
+    assert "cannot run '/no/such/command': No such file or directory" in result.stderr
     assert daemon.asked[-1] == ("lease", {"lease": "t0ken", "duration_s": 0.0})
 
 

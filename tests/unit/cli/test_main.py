@@ -47,6 +47,19 @@ def test_every_designed_command_is_there() -> None:
     assert set(DESIGNED) <= set(main.commands)
 
 
+def test_streams_that_are_closed_give_their_numbers_to_nobody(tmp_path: Path) -> None:
+    """Begun without its three streams a command works, and no file of its own gets their place."""
+    program = (
+        "import os, sys; from legato.cli.entry import whole_streams as w; w(); "
+        "names = [os.readlink(f'/proc/self/fd/{n}') for n in range(3)]; "
+        "sys.stderr.write('said'); print('said', flush=True); "
+        f"open({str(tmp_path / 'told')!r}, 'w').write(str(names))"
+    )
+    command = ["bash", "-c", '"$0" -c "$1" <&- >&- 2>&-', sys.executable, program]
+    subprocess.run(command, check=True, timeout=60.0)
+    assert (tmp_path / "told").read_text() == str(["/dev/null"] * 3)
+
+
 def test_help_loads_nothing_heavy() -> None:
     """Showing help imports neither numpy nor OpenCV, sockets, plots or the solver."""
     heavy = "{'numpy', 'cv2', 'scipy', 'zmq', 'matplotlib', 'msgspec', 'structlog', 'jinja2'}"

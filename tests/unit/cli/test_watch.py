@@ -222,3 +222,46 @@ def test_it_draws_at_any_size_and_before_anything_is_known(width: int, height: i
         lines = drawn(live, 15.0, width, height).splitlines()
         assert len(lines) <= height
         assert max(map(len, lines)) <= width
+
+
+def test_a_job_that_has_ended_is_no_progress_of_a_later_fault() -> None:
+    """An emergency stop after a whole job shows no strokes; a fault in a job shows how far."""
+    live = seen()
+    follow(live)
+    live.take("state", {"boot": "b1", "state": "fault"}, 15.0)
+    live.take("session", {"boot": "b1", "id": "s1", "job": "run", "outcome": "fault"}, 15.0)
+    assert live.progress["done"] == 4
+    live.take("state", {"boot": "b1", "state": "idle"}, 15.5)
+    live.take("fault", {"boot": "b1", "cause": "estop", "text": "asked for"}, 16.0)
+    live.take("state", {"boot": "b1", "state": "fault"}, 16.0)
+    assert live.progress == {}
+
+
+@pytest.mark.parametrize(("width", "height"), [(60, 20), (80, 24), (120, 40)])
+def test_a_dead_daemon_leaves_old_news_that_says_so(width: int, height: int) -> None:
+    """Panels tell when they were true, a stay counts no further, no reset is offered."""
+    live = seen()
+    told = {"boot": "b1", "cause": "arm_lost", "text": "no answer", "hint": "plug it in"}
+    live.take("fault", told, 12.0)
+    live.take("state", {"boot": "b1", "state": "fault"}, 12.0)
+    live.take("heartbeat", {"boot": "b1", "state": "fault", "t": 1.0, "uptime_s": 1.0}, 14.0)
+    live.lose(16.0)
+    page = drawn(live, 120.0, width, height)
+    assert "last known: fault" in page
+    assert "as last heard" in page
+    assert "hardware stop" in page
+    assert "legato reset" not in page
+    assert live.upto(120.0) == 14.0
+    if width == 120:
+        assert re.search(r"> fault +2\.0 s", page)
+    live.answered(status("fault", fault=told), 121.0)
+    page = drawn(live, 121.5, width, height)
+    assert "as last heard" not in page
+    assert "legato reset" in page
+
+
+def test_the_head_says_which_device_is_simulated() -> None:
+    """A real arm beside a simulated camera is no simulated cell."""
+    live = seen()
+    live.status["simulated_devices"] = ["camera"]
+    assert " SIMULATED CAMERA " in drawn(live, 10.5)

@@ -9,7 +9,9 @@ import pytest
 from rich.console import Console
 
 from legato.cli import watch
+from legato.cli.command import Context, Services
 from legato.cli.live import Live
+from legato.cli.output import Output
 from legato.daemon.client import Client, DaemonUnavailable
 from tests.unit.cli.watched import STATES, seen, status
 
@@ -67,3 +69,32 @@ def test_events_are_taken_and_drawn_as_they_come() -> None:
     watch.hear(cast(Client, Telling()), live, lambda: drawings.append(live.state))
     assert live.state == "fault"
     assert drawings[-1] == "fault"
+
+
+def test_lines_say_when_the_daemon_falls_silent_and_when_it_is_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Who reads a pipe learns of a daemon that is gone: once, and once when it is heard again."""
+    clock = iter(float(10 * n) for n in range(100))
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+
+    class Silent(Flaky):
+        batches = 0
+
+        def events(self, timeout_s: float) -> Iterator[tuple[str, dict[str, Any]]]:
+            del timeout_s
+            self.batches += 1
+            if self.batches == 3:
+                yield "state", {"boot": "b1", "state": "idle"}
+
+    said: list[dict[str, Any]] = []
+
+    class Kept(Output):
+        def line(self, document: Any) -> None:
+            said.append(document)
+
+    context = Context(None, Kept(as_json=True), Services())
+    watch.each_line(context, cast(Client, Silent()), False, 1)
+    assert [(row["topic"], row.get("link")) for row in said] == [
+        ("link", "stale"), ("link", "live"), ("state", None),
+    ]  # fmt: skip

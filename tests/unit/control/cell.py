@@ -51,7 +51,7 @@ def cell_settings(**changes: Any) -> CellSettings:
         "calibration": CalibrationSettings(),
         "engine": EngineSettings(),
         "massage": MassageSettings(),
-        "simulated": True,
+        "simulated_devices": ("arm", "camera"),
     }
     return CellSettings(**(values | changes))
 

@@ -135,6 +135,29 @@ def test_a_key_starts_one_campaign(house: House) -> None:
     )
 
 
+@pytest.mark.parametrize("over", [False, True])
+@pytest.mark.parametrize(
+    "other", [{"job": "home"}, {"count": 2}, {"every_s": 3.0}, {"for_s": 9.0}, {"resets": 1}]
+)
+def test_a_key_is_held_to_what_was_asked_with_it(
+    make: Maker, over: bool, other: dict[str, Any]
+) -> None:
+    """Another campaign is refused, as a job is, whether the first is under way or long over."""
+    house = make().known()
+    asked = {"job": "capture", "count": 1, "key": "tonight"}
+    name, session = begin(house, **asked)
+    if over:
+        house.end(session)
+        house.close()
+        house = make().known()
+    assert house.result("campaign", **asked)["campaign"] == name
+    code, _, reason = house.error("campaign", **(asked | other))
+    assert code == -32602
+    assert name in reason
+    assert next(iter(other)) in reason
+    assert house.task() is None
+
+
 def test_contacts_are_summed_up(house: House) -> None:
     """Count, mean, spread and ends of each station, of each session and of all."""
     name, first = begin(house, job="run", count=2)

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import pytest
 from msgspec import structs
 
+from legato.config.build import cell_settings
 from legato.config.load import Loaded
 from legato.config.schema import CameraTable, CellTable, Config, RobotTable, SimTable
 from legato.daemon.cell import WallClock, build_cell, build_clock
@@ -45,7 +46,10 @@ def test_drivers_follow_the_configuration(
     assert (type(cell.arm), type(cell.camera), type(cell.clock)) == (arm_type, camera_type, clock)
     assert (cell.witness is not None) == (robot == "sim")
     assert (cell.stands_at is not None) == (robot == "sim")
-    assert cell.simulated == (robot == "sim")
+    told = cell_settings(loaded(robot, camera))
+    assert ("arm" in told.simulated_devices) == (robot == "sim")
+    assert ("camera" in told.simulated_devices) == (camera == "sim")
+    assert told.simulated == ("sim" in (robot, camera))
 
 
 @pytest.mark.parametrize(
@@ -62,7 +66,6 @@ def test_faults_strike_whatever_drivers_there_are(robot: Any, arm_type: type[Fau
     arm, camera = with_fault("arm_lost"), with_fault("blank")
     assert (type(arm.arm), type(arm.camera)) == (arm_type, SimCamera)
     assert (isinstance(camera.arm, FaultyArm), type(camera.camera)) == (False, FaultyCamera)
-    assert arm.simulated == (robot == "sim")
     assert arm.witness is None or isinstance(arm.witness, SimArm)
 
 

@@ -191,6 +191,25 @@ def test_a_disk_that_fails_in_a_job_is_a_fault(house: House) -> None:
     assert house.result("session", session=session)["outcome"] == "fault"
 
 
+def test_a_disk_that_fails_at_the_stop_lets_the_arm_retract_first(house: House) -> None:
+    """Where the stop's own line is the first that is lost, the way off the leg goes on."""
+    session = house.begin("home")
+    current = house.sessions.current
+    assert current is not None
+    assert current.writer is not None
+    current.writer.close()
+    house.result("stop")
+    house.hear(Happened(session, "progress", {"text": "on"}))
+    house.pass_time(1.0)
+    assert house.conductor.state == "stopping"
+    with pytest.raises(StopRequested):
+        house.orders.look()
+    house.orders.look()  # the retract is broken off by nothing
+    house.end(session, "stopped")
+    assert house.result("status")["fault"]["cause"] == "disk"
+    assert house.result("session", session=session)["outcome"] == "fault"
+
+
 def test_a_fault_that_the_disk_did_not_keep_is_kept_once_it_can_be(house: House) -> None:
     """What the next start must know is tried again with each heartbeat, changed or not."""
     way = house.folder / ".state.json.tmp"

@@ -7,7 +7,14 @@ import pytest
 
 from legato.config.errors import ConfigError
 from legato.config.schema import CurveTable, ServerTable
-from legato.daemon.keys import client_keys, make_keys, read_clients, read_public, read_secret
+from legato.daemon.keys import (
+    client_keys,
+    is_closed,
+    make_keys,
+    read_clients,
+    read_public,
+    read_secret,
+)
 from legato.daemon.who import Who
 
 
@@ -52,10 +59,40 @@ def test_systemds_credentials_are_read_as_they_come(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Systemd closes its folder to others, and shows other bits on the files."""
-    secret, _ = make_keys(tmp_path, "cell", "server")
+    secret, _ = make_keys(tmp_path / "c", "cell", "server")
     secret.chmod(0o440)
-    monkeypatch.setenv("CREDENTIALS_DIRECTORY", str(tmp_path))
+    secret.parent.chmod(0o500)
+    monkeypatch.setenv("CREDENTIALS_DIRECTORY", str(secret.parent))
     assert read_secret(secret, "server.curve.secret").secret
+    secret.parent.chmod(0o700)
+
+
+@pytest.mark.parametrize("mode", [0o755, 0o711, 0o720, 0o770])
+def test_a_folder_that_others_may_enter_is_none_of_systemds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: int
+) -> None:
+    """A variable alone lifts no check: the folder itself has to be closed."""
+    secret, _ = make_keys(tmp_path / "c", "cell", "server")
+    secret.chmod(0o440)
+    secret.parent.chmod(mode)
+    monkeypatch.setenv("CREDENTIALS_DIRECTORY", str(secret.parent))
+    with pytest.raises(ConfigError, match=r"server\.curve\.secret.*chmod 600"):
+        read_secret(secret, "server.curve.secret")
+
+
+@pytest.mark.parametrize(
+    ("mode", "owner", "group", "closed"),
+    [
+        (0o500, 7, 7, True), (0o700, 7, 7, True), (0o500, 0, 0, True), (0o550, 0, 0, True),
+        (0o550, 7, 7, False), (0o550, 0, 7, False), (0o570, 0, 0, False), (0o501, 0, 0, False),
+        (0o500, 8, 7, False), (0o700, 8, 8, False),
+    ],
+)  # fmt: skip
+def test_a_closed_folder_is_roots_or_our_own(
+    mode: int, owner: int, group: int, closed: bool
+) -> None:
+    """Nobody else may enter it; a group of root shows what an access list allows."""
+    assert is_closed(mode, owner, group, us=7) is closed
 
 
 def test_a_credential_stands_before_a_file_of_its_name(

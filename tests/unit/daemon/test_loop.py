@@ -248,9 +248,9 @@ def test_ready_is_told_once(served: Served) -> None:
 
 def test_the_loop_ends_when_the_worker_has_gone(served: Served) -> None:
     """Asked to end, the loop quits the worker and then returns."""
-    asked = iter([False, True])
+    asked = iter([None, "SIGTERM"])
     served.mailbox.put(WorkerGone())
-    served.loop.run(lambda: next(asked, True))
+    served.loop.run(lambda: next(asked, "SIGTERM"))
     assert served.house.conductor.finished
 
 

@@ -1,13 +1,15 @@
 """What a dead daemon left: open sessions are closed, faults stay, the arm's place is kept."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from legato.daemon.messages import DevicesKnown
 from legato.daemon.past import LATEST, read_older, read_past
 from legato.daemon.sessions import KEPT
+from legato.records.errors import RecordError
 from legato.records.store import Store, Summary
 from tests.unit.daemon.bench import STARTED, Silent
 from tests.unit.daemon.house import GOOD, House
@@ -35,6 +37,33 @@ def test_an_open_session_is_interrupted(store: Store) -> None:
     assert past.fault is not None
     assert (past.fault["cause"], past.fault["session"]) == ("interrupted", writer.id)
     assert [s.outcome for s in past.sessions] == ["interrupted"]
+    assert store.unfinished() == []
+
+
+def test_a_full_disk_keeps_no_daemon_from_its_fault(
+    store: Store,
+) -> None:
+    """A session that was open is interrupted for whoever asks, and for good with the next start."""
+    writer = store.begin({"job": "run", "started": STARTED})
+    writer.close()
+    full = RecordError("no space left on device", "free some")
+
+    class Full(Store):
+        def save_state(self, state: Mapping[str, Any]) -> None:
+            del state
+            raise full
+
+        def close_interrupted(self, session: str, ended: str | None = None) -> None:
+            del session, ended
+            raise full
+
+    log = Silent()
+    past = read_past(Full(store.state_dir), log, arm=None)
+    assert past.fault is not None
+    assert past.fault["session"] == writer.id
+    assert [s.outcome for s in past.sessions] == ["interrupted"]
+    assert store.unfinished() == [writer.id]
+    assert read_past(store, log, arm=None).fault is not None
     assert store.unfinished() == []
 
 

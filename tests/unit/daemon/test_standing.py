@@ -29,9 +29,9 @@ def test_status_has_the_designs_keys(house: House) -> None:
     """The answer's shape is part of the wire."""
     status = house.result("status")
     assert list(status) == [
-        "api", "version", "boot", "simulated", "state", "session", "station", "progress",
-        "uptime_s", "arm", "camera", "calibration", "fault", "lacking", "lease", "stop",
-        "campaign",
+        "api", "version", "boot", "simulated", "simulated_devices", "state", "session",
+        "station", "progress", "uptime_s", "arm", "camera", "calibration", "fault", "lacking",
+        "lease", "stop", "campaign",
     ]  # fmt: skip
     assert list(status["arm"]) == [
         "connected", "referenced", "xyz_mm", "pitch_deg", "roll_deg", "contact",
@@ -106,13 +106,16 @@ def test_shutdown_lets_the_job_retract_first(house: House) -> None:
 
 
 def test_shutdown_waits_for_nobody_for_ever(house: House) -> None:
-    """A job that does not end is dropped and closed as interrupted; so is a stuck worker left."""
+    """A job that does not end is dropped at the deadline, in a fault that the next start finds."""
     session = house.begin("home")
     house.result("shutdown")
-    house.pass_time(21.0)
+    house.pass_time(29.0)
+    assert house.conductor.state == "stopping"
+    house.pass_time(2.0)
     with pytest.raises(Dropped):
         house.orders.look()
-    assert session_json(house, session)["outcome"] == "interrupted"
+    assert session_json(house, session)["outcome"] == "fault"
+    assert house.store.load_state()["fault"]["cause"] == "deadline"
     house.pass_time(6.0)
     assert house.conductor.finished
 

@@ -13,7 +13,7 @@ from legato.daemon.messages import Moved, TaskEnded, WorkerGone
 from legato.daemon.orders import DoReference, DoReset
 from legato.daemon.worker import truth_since
 from legato.geometry.motion import StepMove, ToolPose
-from legato.hal.faults import Cause
+from legato.hal.faults import Cause, DeviceError
 from legato.records.errors import RecordError
 from tests.unit.daemon.bench import ZERO, Bench, Work, settings, shifted, turn
 from tests.unit.daemon.working import GONE, after, moving
@@ -167,6 +167,19 @@ def test_reset_opens_what_was_lost(bench: Bench) -> None:
     assert (end.token, end.problem) == (2, None)
     assert end.view.arm["connected"]
     assert bench.arm.moves == []
+
+
+def test_reset_asks_a_camera_that_counts_as_there(bench: Bench) -> None:
+    """One that has died since its last picture is found by reset, and by no later job."""
+    assert bench.start().view.camera_connected
+    bench.camera.missing = DeviceError(Cause.CAMERA_LOST, "no picture", "see its cable")
+    bench.orders.give(DoReset(1))
+    end = bench.until(TaskEnded)
+    assert end.problem == ("no picture", "see its cable")
+    assert not end.view.camera_connected
+    bench.camera.missing = None
+    bench.orders.give(DoReset(2))
+    assert bench.until(TaskEnded).view.camera_connected
 
 
 def test_the_end_closes_both_devices(bench: Bench) -> None:

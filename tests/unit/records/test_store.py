@@ -210,6 +210,19 @@ def test_a_clock_that_jumps_ahead_leaves_the_newest(store: Store, begin: Begin) 
     assert store.prune(90, future, keep_newest=2) == [writers[0].id]
 
 
+def test_one_that_cannot_be_removed_keeps_no_other(store: Store, begin: Begin) -> None:
+    """The others go, then it is said which could not."""
+    ids = []
+    for days in (30, 20, 10):
+        writer = begin(1, at(days))
+        writer.finish("done", None, None, at(days))
+        ids.append(writer.id)
+    (store.folder / f".pruned-{ids[0]}").write_text("in the way")
+    with pytest.raises(RecordError, match=rf"cannot remove .*{ids[0]}.*; 2 others are removed"):
+        store.prune(1.0, NOW)
+    assert [s.id for s in store.sessions()] == ids[:1]
+
+
 def test_what_a_crash_left_is_swept_away(store: Store, begin: Begin) -> None:
     """Half a removal or half a beginning is no session; a beginning under way is let be."""
     begin(1)

@@ -1,15 +1,16 @@
-"""A whole record is held to its seal: whatever file is changed or lost is named."""
+"""A whole record is held to its seal: whatever file is changed, lost or added is named."""
 
 from pathlib import Path
 
 import pytest
 
 from legato.records.files import encode, read_object
+from legato.records.head import head_digest
 from legato.records.session import SessionWriter
 from legato.records.store import Store
 from legato.records.trajectory import COMMANDED
 from legato.records.whole import verify_record
-from tests.unit.records.conftest import Begin
+from tests.unit.records.conftest import STARTED, Begin
 
 ENDED = "2026-11-22T02:00:00+00:00"
 
@@ -18,6 +19,8 @@ ENDED = "2026-11-22T02:00:00+00:00"
 def path(begin: Begin) -> Path:
     """Return the folder of a finished session with every kind of file."""
     writer = begin(2)
+    asked = {"id": writer.id, "job": "run", "outcome": None}
+    writer.event("session", asked, t=0.0, wall=STARTED)
     fill(writer)
     told = {"id": writer.id, "job": "run", "outcome": "done"}
     writer.event("session", told, t=9.0, wall=ENDED)
@@ -65,11 +68,75 @@ def test_a_changed_line_comes_first_and_names_its_number(path: Path) -> None:
 
 @pytest.mark.parametrize(("name", "value"), [("outcome", "fault"), ("job", "home")])
 def test_a_head_that_contradicts_the_lines_is_found(path: Path, name: str, value: str) -> None:
-    """session.json has no hash of its own: the lines say what was asked and how it ended."""
+    """The lines say what was asked and how it ended: this comes before that a hash is another."""
     meta = read_object(path / "session.json") | {name: value}
     (path / "session.json").write_bytes(encode(meta))
-    (finding,) = verify_record(path).findings
-    assert finding.startswith(f"session.json: {name} is {value}")
+    first, *others = verify_record(path).findings
+    assert first.startswith(f"session.json: {name} is {value}")
+    assert all("another hash" in text for text in others)
+    assert others
+
+
+@pytest.mark.parametrize("end", ["finished", "interrupted", "running"])
+def test_every_changed_byte_of_the_head_is_found(
+    path: Path, store: Store, begin: Begin, end: str
+) -> None:
+    """Configuration, who asked, times, reason, the seal itself: whichever, and however it ended."""
+    if end != "finished":
+        writer = begin(1)
+        writer.event("session", {"id": writer.id, "job": "run"}, t=0.0, wall=STARTED)
+        fill(writer)
+        writer.close()
+        path = writer.path
+    if end == "interrupted":
+        store.close_interrupted(path.name)
+    assert verify_record(path).ok
+    head = path / "session.json"
+    content = head.read_bytes()
+    for at in range(len(content)):
+        head.write_bytes(content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :])
+        assert not verify_record(path).ok, (at, content[at - 20 : at + 20])
+
+
+def test_a_head_with_a_seal_of_its_own_is_contradicted_by_the_lines(path: Path) -> None:
+    """Who writes another configuration and the hash to it has not changed the first line."""
+    meta = read_object(path / "session.json") | {"params": {"picks": {}}}
+    meta["seal"]["head"] = head_digest(meta)
+    (path / "session.json").write_bytes(encode(meta) + b"\n")
+    assert verify_record(path).findings == (
+        "session.json is changed: its first line has another hash",
+    )
+    del meta["seal"]
+    (path / "session.json").write_bytes(encode(meta) + b"\n")
+    assert "session.json is changed: it tells of an end and has no seal" in (
+        verify_record(path).findings
+    )
+
+
+def test_an_added_file_is_named_and_a_report_is_none(path: Path) -> None:
+    """Wherever it lies and whatever it is; what is made of a record later may lie beside it."""
+    (path / "report.html").write_text("made later")
+    assert verify_record(path).ok
+    (path / "frames" / "other.png").write_bytes(b"other")
+    (path / "more").mkdir()
+    (path / "more" / ".hidden").write_bytes(b"")
+    (path / "link").symlink_to("/")
+    assert verify_record(path).findings == tuple(
+        f"{place} was added after the record had ended"
+        for place in ("frames/other.png", "link", "more/.hidden")
+    )
+
+
+def test_a_record_of_an_earlier_version_is_held_to_what_it_has(begin: Begin) -> None:
+    """No digest of its head, none is missed; files and lines are held to their hashes."""
+    writer = begin(2)
+    fill(writer)
+    meta = writer.finish("done", None, None, ENDED)
+    del meta["seal"]["head"]
+    (writer.path / "session.json").write_bytes(encode(meta) + b"\n")
+    assert verify_record(writer.path).ok
+    (writer.path / "effects.jsonl").unlink()
+    assert verify_record(writer.path).findings == ("effects.jsonl is missing",)
 
 
 def test_a_damaged_head_is_a_finding_and_no_error(path: Path) -> None:

@@ -61,7 +61,7 @@ def test_evidence_is_a_list_of_names_and_figures_with_units() -> None:
         ),
         ("last bytes", ["none"]),
         ("depth", ["1.25 mm"]),
-        ("residuals", ["P1: 0.5, -0.25"]),
+        ("residuals", ["P1: 0.5, -0.25 px"]),
         ("missing", ["none"]),
     ]
 

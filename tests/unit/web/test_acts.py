@@ -46,3 +46,11 @@ def test_stops_have_a_line_of_their_own() -> None:
 def test_neither_lease_nor_shutdown_is_for_pages() -> None:
     """A page is closed by mistake; nothing may hang on it."""
     assert {"lease", "shutdown"}.isdisjoint(METHODS)
+
+
+@pytest.mark.parametrize("name", ["self", "method", "seconds", "expires_at", "timeout_s"])
+def test_what_the_server_says_itself_no_page_can_give(name: str) -> None:
+    """It is refused as a bad request before it gets anywhere."""
+    with pytest.raises(Refused, match=name) as refused:
+        acts("secret").act("home", {name: 1})
+    assert (refused.value.status, bool(refused.value.hint)) == (400, True)

@@ -117,3 +117,25 @@ def test_a_running_sessions_picture_is_seen_as_soon_as_it_is_there(tmp_path: Pat
     assert shelf.look()["picture"]["name"] == "frames/verify.png"
     writer.finish("done", None, None, "2026-11-22T01:48:00+00:00")
     assert shelf.look()["picture"]["name"] == "frames/verify.png"
+
+
+@pytest.mark.parametrize(
+    ("told", "simulated"),
+    [
+        ({"simulated": True}, True),  # as older records have it
+        ({"simulated": True, "simulated_devices": ["arm", "camera"]}, True),
+        ({"simulated": True, "simulated_devices": ["arm"]}, False),
+        ({"simulated": True, "simulated_devices": ["camera"]}, True),
+        ({"simulated": False, "simulated_devices": []}, False),
+    ],
+)
+def test_a_picture_is_as_simulated_as_its_camera(
+    whole: SessionRecord, told: dict[str, object], simulated: bool
+) -> None:
+    """A real camera's picture is none of a simulation, whatever moves the arm."""
+    record = SessionRecord(whole.path, {**whole.meta, **told}, whole.events, whole.torn)
+    if "simulated_devices" not in told:
+        record.meta.pop("simulated_devices", None)
+    view = view_of(record)
+    assert view is not None
+    assert view["simulated"] is simulated

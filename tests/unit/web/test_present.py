@@ -113,3 +113,12 @@ def session(store: Store, second: int, job: str, contact: dict[str, Any] | None 
         writer.event("contact", contact, t=1.0, wall=wall)
     writer.finish("done", None, None, wall)
     return writer.id
+
+
+def test_with_no_daemon_heard_nobody_knows_what_is_earlier(wall: Wall) -> None:
+    """A page whose key is refused calls nothing earlier than a daemon that it knows nothing of."""
+    board = Board(ArmModel(), wall.publish)
+    board.looked(VIEW, {**VIEW, "by": "s1"}, Contacts("s1", "s1", BANDS, [TOUCH]))
+    assert (wall["picture"]["earlier"], wall["contacts"]["earlier"]) == (None, None)
+    board.status(CALIBRATED, WALL)
+    assert (wall["picture"]["earlier"], wall["contacts"]["earlier"]) == (False, False)

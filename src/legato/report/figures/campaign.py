@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 ACROSS = 4  # panels beside each other
 IN_A_ROW = 7  # names of a legend
+LEAST_MM = 0.2  # the least that a panel of heights spans
 IDLE = "idle"
 SPREAD = "\N{PLUS-MINUS SIGN} their standard deviation"
 AXIS_COLOURS = dict(zip("xyz", (RED, GREEN, BLUE), strict=True))
@@ -40,13 +41,14 @@ def contacts(found: Comparison) -> str | None:
     if not found.stations:
         return None
     rows = -(-len(found.stations) // ACROSS)
-    figure = sheet(2.5 * rows + 0.35, left=1.0, top=0.6)
+    figure = sheet(2.5 * rows + 0.6, left=1.0, top=0.85)
     panels = figure.subplots(rows, ACROSS, squeeze=False).ravel()
     figure.subplots_adjust(wspace=0.62, hspace=0.5)
     words = {name: name for name in ("stroke", "mean of the sessions", SPREAD)}  # each told once
     for axes, station in zip(panels, found.stations, strict=False):
         _station(axes, station, words)
-        _by_session(axes, [side.number for side in found.sides])
+        _by_session(axes, [side.number for side in found.sides], most=5)
+        _at_least(axes, LEAST_MM)
         axes.set_xlim(0.4, len(found.sides) + 0.6)
         axes.ticklabel_format(axis="y", useOffset=False)
         dressed(axes, x="session", title=f"{station.station_mm:g} mm", grid="y")
@@ -96,6 +98,7 @@ def poses(found: Comparison) -> str | None:
             axes.plot(numbers, [v[axis] for v in values], "o-", color=colour, markersize=4,
                       linewidth=0.9, label=name)  # fmt: skip
         _by_session(axes, numbers)
+        _at_least(axes, LEAST_MM / 10.0)
         dressed(axes, x="session", y=f"from the mean ({unit})", title=title)
         axes.legend(fontsize=SMALL, frameon=False, ncols=3, loc="lower right",
                     bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)  # fmt: skip
@@ -122,7 +125,7 @@ def quality(found: Comparison) -> str | None:
     numbers = [s.number for s in found.sides]
     for axes, (title, values, colour) in zip(panels, shown, strict=True):
         axes.bar(numbers, [v or 0.0 for v in values], color=colour, width=0.6)
-        _by_session(axes, numbers)
+        _by_session(axes, numbers, most=6)
         dressed(axes, x="session", title=title, grid="y")
     return svg(figure)
 
@@ -172,8 +175,15 @@ def _patch(colour: str) -> "Patch":
     return Patch(color=colour)
 
 
-def _by_session(axes: "Axes", numbers: Sequence[int]) -> None:
-    """Mark whole sessions on the x axis, every one where there is room."""
-    step = max(1, -(-len(numbers) // 12))
+def _at_least(axes: "Axes", span: float) -> None:
+    """Widen a panel's heights to a span: what is far less than a motor's step is no spread."""
+    low, high = axes.get_ylim()
+    middle, half = (low + high) / 2.0, max(high - low, span) / 2.0
+    axes.set_ylim(middle - half, middle + half)
+
+
+def _by_session(axes: "Axes", numbers: Sequence[int], most: int = 12) -> None:
+    """Mark whole sessions on the x axis, every one where there is room for `most` or fewer."""
+    step = max(1, -(-len(numbers) // most))
     axes.set_xticks(list(numbers)[::step])
     axes.tick_params(labelsize=NORMAL)

@@ -25,6 +25,8 @@ WHY_COLOURS = {
     "press": RED,
     "retract": GREEN,
 }
+# Up and down are one line: the wide one lies below, so that both are seen.
+LAYERS = (("transit", 1.0), ("approach", 1.0), ("retract", 3.0), ("descend", 1.3), ("press", 1.3))
 WIDEST_PICTURE = 1280
 SMALL, NORMAL = 8.0, 9.0
 WIDTH = 8.6  # inches

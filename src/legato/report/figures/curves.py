@@ -77,13 +77,23 @@ def cost(
     return svg(figure)
 
 
-def contact_heights(contacts: Sequence[Mapping[str, Any]], bands: Mapping[float, Band]) -> str:
-    """Return touched heights over the predicted surface, beside both bands of each station."""
+def contact_heights(
+    contacts: Sequence[Mapping[str, Any]],
+    bands: Mapping[float, Band],
+    step_mm: float = 0.0,
+    ended: Mapping[str, Any] | None = None,
+) -> str:
+    """Return touched heights over the predicted surface, beside both bands of each station.
+
+    A touch lies within half a step of the descent, `step_mm`, of where it is drawn; `ended` is the
+    touch that ended the session in a fault.
+    """
     stations = list(bands)
     figure = sheet(2.9, left=0.85, top=0.35)
     axes = figure.subplots()
     axes.axhline(0.0, color=SOFT, linewidth=1.0)
-    words = {name: name for name in (EXPECTED, ACCEPTED, "touched")}  # each is told once
+    told = f"touched, within the descent\u2019s step of {step_mm:g} mm" if step_mm else "touched"
+    words = {name: name for name in (EXPECTED, ACCEPTED, told)}  # each is told once
     for place, station in enumerate(stations):
         band = bands[station]
         if band.expected_mm:
@@ -98,10 +108,16 @@ def contact_heights(contacts: Sequence[Mapping[str, Any]], bands: Mapping[float,
             )  # fmt: skip
         own = [c for c in contacts if float(c["station_mm"]) == station]
         offsets = (np.arange(len(own)) - (len(own) - 1) / 2) * min(0.12, 0.5 / max(len(own), 1))
-        axes.plot(
-            place + offsets, [float(c["contact_mm"]) for c in own], "o", color=RED, markersize=5,
-            markeredgecolor="white", label=words.pop("touched", None),
-        )  # fmt: skip
+        heights = [float(c["contact_mm"]) for c in own]
+        if own:
+            axes.errorbar(
+                place + offsets, heights, yerr=step_mm / 2.0 if step_mm else None, fmt="o",
+                color=RED, ecolor=RED, elinewidth=1.0, markersize=5, markeredgecolor="white",
+                label=words.pop(told, None),
+            )  # fmt: skip
+        if ended is not None and ended["station_mm"] == station:
+            axes.plot(place, ended["height_mm"], "X", color=INK, markersize=9,
+                      markeredgecolor="white", label="the touch that ended it")  # fmt: skip
     axes.set_xticks(range(len(stations)), [f"{s:g} mm" for s in stations])
     axes.set_xlim(-0.6, len(stations) - 0.4)
     dressed(axes, x="station", y="height over the\npredicted surface (mm)", grid="y")
@@ -109,7 +125,7 @@ def contact_heights(contacts: Sequence[Mapping[str, Any]], bands: Mapping[float,
         fontsize=SMALL,
         frameon=False,
         loc="upper left",
-        ncols=3,
+        ncols=4,
         bbox_to_anchor=(0, 1.17),
         borderaxespad=0.0,
     )

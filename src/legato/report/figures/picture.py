@@ -9,6 +9,7 @@ from legato.geometry.transforms import Array
 from legato.report.figures.canvas import (
     BLUE,
     GREEN,
+    LAYERS,
     NORMAL,
     ORANGE,
     RED,
@@ -60,9 +61,10 @@ def trajectory_overlay(
     _leg(axes, scene)
     _stations(axes, scene)
     pixels = scene.pixels_of_world(np.stack([path["x"], path["y"], path["z"]], axis=-1))
-    for why, colour in WHY_COLOURS.items():
+    for why, wide in LAYERS:
         u, v = runs(path["why"], pixels, why).T
-        axes.plot(u, v, color=colour, linewidth=1.8, path_effects=haloed(1.8))
+        halo = haloed(1.8) if why not in ("descend", "press") else None
+        axes.plot(u, v, color=WHY_COLOURS[why], linewidth=1.8 * wide, path_effects=halo)
     touched = [c["xyz_mm"] for c in contacts if c.get("xyz_mm")]
     if touched:
         u, v = scene.pixels_of_world(np.asarray(touched, dtype=float)).T

@@ -10,6 +10,7 @@ from legato.report.figures.canvas import (
     FAINT,
     GREEN,
     INK,
+    LAYERS,
     NORMAL,
     RED,
     SMALL,
@@ -112,10 +113,10 @@ def _draw(
             outline = silhouette(apply(true_pose, samples)[:, plane])
             axes.plot(*outline.T, color=INK, linewidth=0.9, linestyle=":", label="leg, true")
         _stations(axes, plane, scene)
-    for why, colour in WHY_COLOURS.items():
+    for why, wide in LAYERS:
         way = runs(whys, places[:, plane], why)
         if np.isfinite(way).any():
-            axes.plot(*way.T, color=colour, linewidth=1.3, label=why)
+            axes.plot(*way.T, color=WHY_COLOURS[why], linewidth=1.3 * wide, label=why)
     touched = [c["xyz_mm"] for c in contacts if c.get("xyz_mm")]
     if touched:
         at = np.asarray(touched, dtype=float)[:, plane]

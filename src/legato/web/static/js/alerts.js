@@ -1,8 +1,8 @@
 // What must not be overlooked: a lost line, a fault, a page that cannot act.
 
-import { act, against, mayAct, onRights } from "./acts.js";
+import { act, against, lacking, mayAct, onRights } from "./acts.js";
 import { $, clock, fill, h, marked, moment, say } from "./dom.js";
-import { known, on } from "./live.js";
+import { known, lastWord, on } from "./live.js";
 
 const boxes = { line: h("div"), fault: h("div"), rights: h("div") };
 fill($("alerts"), Object.values(boxes));
@@ -10,7 +10,7 @@ let announced = "";
 
 on("line", () => {
   const line = document.body.dataset.line;
-  const since = known.line?.since;
+  const since = lastWord();
   const what = {
     lost: ["No connection to the daemon", known.line?.reason, known.line?.hint],
     cut: ["No connection to this page\u2019s server", "legato web has ended, or this machine is busy", "start it again; this page finds it by itself"],
@@ -18,12 +18,12 @@ on("line", () => {
   }[line];
   fill(boxes.line, what && h("section", { class: "alert lost", "aria-label": "Connection" },
     h("h2", {}, what[0]),
-    h("p", {}, "All that is shown below is old",
-      line === "lost" && since ? `: the last was heard at ${clock(since)}. ` : ". ",
+    h("p", {}, since ? `All that is shown below is old: the last was heard at ${clock(since)}. `
+      : "The daemon has not been heard yet: what is shown below is from the records. ",
       "The cell may be moving. Use the hardware stop if in doubt.",
-      line === "lost" && known.line.stop && " Its stop line still answers: Stop and E-stop reach it."),
+      line === "lost" && known.line.stop && against("stop") === null && " Its stop line still answers: Stop and E-stop reach it."),
     h("p", { class: "note" }, marked([what[1], what[2]].filter(Boolean).join("; ")))));
-  if (what) urgent(`${what[0]}. What is shown is old.`);
+  if (what) urgent(`${what[0]}. ${since ? "What is shown is old." : "Nothing has been heard yet."}`);
   else if (line === "up" && announced.startsWith("No")) urgent("Connected again.");
 });
 
@@ -49,7 +49,8 @@ on("fault state line", () => {
 });
 
 onRights(() => {
-  fill(boxes.rights, !mayAct() && h("p", { class: "alert quiet" }, against("run")));
+  const no = against("stop") ?? lacking();
+  fill(boxes.rights, no && h("p", { class: "alert quiet" }, no));
 });
 
 const reset = (no) => h("button", { type: "button", class: "plain first", "aria-disabled": no !== null, title: no ?? "", onclick: () => act("reset") }, "Reset");

@@ -23,8 +23,10 @@ function show() {
       expected: band?.expected_mm ?? null, accepted: band?.accepted_mm ?? known.cell.contact_window_mm };
   });
   say($("contacts-of"), rows.length ? `session ${session}` : "");
-  $("contacts").classList.toggle("earlier", earlier);
+  $("contacts").classList.toggle("earlier", earlier !== false);
+  if (!rows.length && !bands) return fill($("contacts"), h("p", { class: "empty" }, "Nothing touched yet. Send run; what is expected is drawn as soon as the leg is found."));
   fill($("contacts"), earlier && h("p", { class: "note" }, h("span", { class: "badge warn" }, "Earlier session"), " Touched by a pose that no longer counts."),
+    earlier === null && h("p", { class: "note" }, h("span", { class: "badge warn" }, "From the records"), " No daemon has been heard: whether it still counts is not known."),
     chart(stations), legend(stations), table(stations));
 }
 

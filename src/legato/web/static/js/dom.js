@@ -76,8 +76,9 @@ export function tone(state) {
   return state === "idle" || !state ? "calm" : "busy";
 }
 
-export const clock = (iso) =>
-  iso ? new Date(iso).toLocaleTimeString([], { hour12: false }) : "\u2013";
+// Every time is told in UTC, as in reports and on the command line.
+export const timeOfDay = (iso) => new Date(iso).toISOString().slice(11, 19);
+export const clock = (iso) => (iso ? `${timeOfDay(iso)} UTC` : "\u2013");
 
 export function ago(seconds) {
   if (!Number.isFinite(seconds)) return "\u2013";
@@ -85,11 +86,9 @@ export function ago(seconds) {
   return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${(seconds / 3600).toFixed(1)} h`;
 }
 
-// A day and time that nobody can misread, on this machine's clock; the tip has UTC.
-export function moment(iso) {
+// A day and time; the tip has it by this machine's clock.
+export function moment(iso, zone = " UTC") {
   if (!iso) return "\u2013";
   const then = new Date(iso);
-  const two = (n) => String(n).padStart(2, "0");
-  const day = `${then.getFullYear()}-${two(then.getMonth() + 1)}-${two(then.getDate())}`;
-  return h("time", { datetime: iso, title: `${then.toISOString().slice(0, 19)} UTC` }, `${day} ${clock(iso)}`);
+  return h("time", { datetime: iso, title: then.toString() }, `${then.toISOString().slice(0, 10)} ${timeOfDay(iso)}${zone}`);
 }

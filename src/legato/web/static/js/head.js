@@ -1,7 +1,7 @@
 // The head of the page, to be read from another room: state, what is done, how far it is.
 
 import { $, ago, clock, fill, h, keeping, say, spoken, tone } from "./dom.js";
-import { known, on } from "./live.js";
+import { known, lastWord, on } from "./live.js";
 
 const LOST = { lost: "No connection", cut: "No connection", silent: "Nothing is heard" };
 let told = null;
@@ -15,9 +15,11 @@ on("line state status progress session", () => {
   say($("state"), lost ? LOST[line] : state ? spoken(state) : "Not connected");
   say($("doing"), lost ? lastHeard(state) : doing(state));
   hardware(line === "cut" || (line === "lost" && known.line.stop === false));
-  document.title = `${lost ? "No connection" : spoken(state)} \u2013 legato${known.status?.simulated ? " (simulated)" : ""}`;
+  document.title = `${lost ? "No connection" : spoken(state)} \u2013 legato${simulated("", " (simulated)", (name) => ` (simulated ${name})`)}`;
   meter(lost || !known.status?.session ? null : known.progress);
-  kind(known.status?.simulated);
+  const chip = simulated("", "Simulated cell", (name) => `Simulated ${name}`);
+  $("kind").hidden = !chip;
+  if ($("kind").textContent !== chip) fill($("kind"), h("strong", {}, chip));
   if (state !== told && !lost) {
     told = state;
     say($("polite"), `State: ${spoken(state)}`);
@@ -25,8 +27,8 @@ on("line state status progress session", () => {
 });
 
 function lastHeard(state) {
-  const when = document.body.dataset.line === "lost" && known.line.since ? ` at ${clock(known.line.since)}` : "";
-  document.body.style.setProperty("--heard", `"as last heard${when}"`);
+  const when = lastWord() ? ` at ${clock(lastWord())}` : "";
+  document.body.style.setProperty("--heard", when ? `"as last heard${when}"` : '"not heard yet"');
   return state ? `${spoken(state)} was the last that was heard${when}.` : "Nothing has been heard yet.";
 }
 
@@ -44,7 +46,7 @@ function doing(state) {
     const job = known.session?.id === known.status.session ? known.session.job : "job";
     const by = known.session?.by && known.session.by !== "local" ? ` for ${known.session.by}` : "";
     const { text, done, total } = known.progress ?? {};
-    const far = text ?? (total ? `${done ?? 0} of ${total} strokes` : "");
+    const far = text ?? (total ? `stroke ${done} of ${total}` : "");
     return `Session ${job}${by}${far ? `: ${far}` : ""}`;
   }
   if (state === "fault") return known.fault?.text ?? "";
@@ -64,19 +66,23 @@ function doing(state) {
 export const repetitions = ({ job, done, failed, total }) =>
   `${job}, ${done}${total ? ` of ${total}` : ""} done${failed ? `, ${failed} failed` : ""}`;
 
+// `done` counts the strokes that were begun: the last of them is under way.
 function meter(progress) {
   const box = $("meter");
   box.hidden = !progress?.total;
   if (box.hidden) return;
   box.setAttribute("aria-valuemax", progress.total);
-  box.setAttribute("aria-valuenow", progress.done ?? 0);
-  box.setAttribute("aria-valuetext", `${progress.done ?? 0} of ${progress.total}`);
-  box.firstElementChild.style.width = `${(100 * (progress.done ?? 0)) / progress.total}%`;
+  const ended = Math.max((progress.done ?? 0) - 1, 0);
+  box.setAttribute("aria-valuenow", ended);
+  box.setAttribute("aria-valuetext", `stroke ${progress.done ?? 0} of ${progress.total}`);
+  box.firstElementChild.style.width = `${(100 * ended) / progress.total}%`;
 }
 
-function kind(simulated) {
-  if (simulated === undefined) return;
-  $("kind").hidden = !simulated;
-  document.body.toggleAttribute("data-simulated", simulated);
-  if (simulated && !$("kind").textContent) fill($("kind"), h("strong", {}, "Simulated cell"));
+// What is simulated of arm and camera: none, both, or one, by its name.
+function simulated(none, both, one) {
+  const devices = simulatedDevices(known.status);
+  return devices.length === 1 ? one(devices[0]) : devices.length ? both : none;
 }
+
+export const simulatedDevices = (status) =>
+  status?.simulated_devices ?? (status?.simulated ? ["arm", "camera"] : []);

@@ -1,7 +1,7 @@
 // Past sessions with their reports, and the last events.
 
 import { report } from "./alerts.js";
-import { $, clock, fill, fixed, h, moment, signed, spoken } from "./dom.js";
+import { $, fill, fixed, h, moment, signed, spoken, timeOfDay } from "./dom.js";
 import { on } from "./live.js";
 
 const TONES = { done: "good", stopped: "calm", refused: "warn", fault: "bad", interrupted: "bad" };
@@ -12,9 +12,9 @@ const WHY = { stopped: "a stop was asked for" };
 on("sessions", ({ sessions }) => {
   if (!sessions.length) return fill($("sessions"), h("p", { class: "empty" }, "No session yet."));
   fill($("sessions"), h("table", {},
-    h("thead", {}, h("tr", {}, ["Began", "Job", "Outcome", "Report", "Why"].map((t) => h("th", { scope: "col" }, t)))),
+    h("thead", {}, h("tr", {}, ["Began, UTC", "Job", "Outcome", "Report", "Why"].map((t) => h("th", { scope: "col" }, t)))),
     h("tbody", {}, sessions.map((row) => h("tr", {},
-      h("td", { class: "num" }, moment(row.started)),
+      h("td", { class: "num" }, moment(row.started, "")),
       h("td", {}, row.job),
       h("td", {}, h("span", { class: `badge ${row.outcome ? TONES[row.outcome] : "busy"}` }, row.outcome ?? "running")),
       h("td", {}, report(row.id, "open")),
@@ -26,7 +26,7 @@ on("sessions", ({ sessions }) => {
 
 on("lines", ({ lines }) => {
   fill($("events"), lines.toReversed().map((line) =>
-    h("li", { "data-topic": line.topic }, h("time", { datetime: line.wall }, clock(line.wall)), " ", h("span", {}, told(line)))));
+    h("li", { "data-topic": line.topic }, h("time", { datetime: line.wall, title: new Date(line.wall).toString() }, timeOfDay(line.wall)), " ", h("span", {}, told(line)))));
 });
 
 function told(line) {
@@ -34,7 +34,7 @@ function told(line) {
     case "state":
       return `${spoken(line.state)}${line.cause ? ` (${line.cause})` : ""}`;
     case "progress":
-      return `${line.text}${line.total ? `, ${line.done} of ${line.total}` : ""}`;
+      return `${line.text}${line.total ? `, stroke ${line.done} of ${line.total}` : ""}`;
     case "contact":
       return `Touched at ${fixed(line.station_mm, 0)} mm, ${signed(line.contact_mm, 2)} mm from the prediction`;
     case "fault":

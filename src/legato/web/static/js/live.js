@@ -6,6 +6,7 @@ const SILENT_MS = 4000; // the server says something every second while it hears
 export const known = {}; // the last of each section
 const wanted = []; // [sections, function]
 let heardAt = 0;
+let heardOn = null;
 let open = false;
 
 // Calls `show(known)` whenever one of the sections has changed.
@@ -15,9 +16,10 @@ export function on(sections, show) {
 
 export function follow() {
   const socket = new WebSocket(`ws://${location.host}/live`);
-  socket.onopen = () => (open = true);
   socket.onmessage = ({ data }) => {
+    open = true; // only with a first word is what is shown of now
     heardAt = performance.now();
+    heardOn = new Date();
     const news = JSON.parse(data);
     Object.assign(known, news);
     for (const [sections, show] of wanted) {
@@ -44,6 +46,9 @@ export function judge() {
     for (const [sections, show] of wanted) if (sections.includes("line")) show(known, {});
   }
 }
+
+// The time at which the daemon was heard last, null where it never was.
+export const lastWord = () => (known.line && !known.line.up ? known.line.since : heardOn);
 
 export const believed = () => document.body.dataset.line === "up";
 

@@ -3,6 +3,7 @@
 
 import { act, against, mayAct, onRights, snap } from "./acts.js";
 import { $, fixed, h, heading, s } from "./dom.js";
+import { about, labels } from "./labels.js";
 import { known, on } from "./live.js";
 
 const LEAST = 6; // marks below which no pose can be told
@@ -34,7 +35,7 @@ const names = () => Object.keys(known.cell?.leg.marks ?? {});
 
 // Whether picks for the picture that is shown can be sent now.
 export const canMark = () =>
-  Boolean(known.picture && !known.picture.earlier) && !picks && against("calibrate") === null;
+  Boolean(known.picture?.earlier === false) && !picks && against("calibrate") === null;
 
 export function startMarking() {
   if (!canMark()) return;
@@ -142,17 +143,19 @@ async function sendPicks() {
 }
 
 // What is drawn over the picture while marking, null while not.
-export function marksLayer() {
+export function marksLayer(tall) {
   if (!picks) return null;
+  const places = picks.map(([name, at]) => ({ name, at: found.marks[name] ?? at, mark: found.marks[name] }));
   return [
     picks.map(([name, [u, v]]) => {
       const mark = found.marks[name];
       const [a, b] = mark ?? [u, v];
       return s("g", { class: mark ? "seen" : "missed" },
         mark && s("path", { class: "thin", d: `M${u} ${v}L${a} ${b}` }),
-        s("path", { d: `M${a - 9} ${b}H${a + 9}M${a} ${b - 9}V${b + 9}` }),
-        s("text", { x: a + 9, y: b + 20 }, mark ? name : `${name}?`));
+        s("path", { d: `M${a - 9} ${b}H${a + 9}M${a} ${b - 9}V${b + 9}` }));
     }),
+    labels(places.map(({ name, at, mark }) => ({ text: mark ? name : `${name}?`, at, kind: mark ? "seen" : "missed" })),
+      places.map(({ at }) => about(at, 9)), known.picture.size, tall),
     pointer && s("path", { class: "hair", d: `M${pointer[0] - 14} ${pointer[1]}h10m8 0h10M${pointer[0]} ${pointer[1] - 14}v10m0 8v10` }),
   ];
 }

@@ -2,6 +2,7 @@
 
 import { report } from "./alerts.js";
 import { $, fill, fixed, h, moment, s } from "./dom.js";
+import { about, along, labels } from "./labels.js";
 import { known, on } from "./live.js";
 import { canMark, markingTools, marksLayer, onMarking, startMarking, watchPicture } from "./marking.js";
 
@@ -14,6 +15,10 @@ fill($("layers"), Object.entries(LAYERS).map(([name, text]) =>
     onchange: (event) => { shown[name] = event.target.checked; draw(); },
   }), text)));
 
+// The names are to be read: larger in a picture that is shown smaller.
+const narrow = matchMedia("(max-width: 700px)");
+const tall = () => (narrow.matches ? 26 : 15);
+
 const image = h("img", { alt: "" });
 const over = s("svg", { "aria-hidden": "true" });
 const frame = h("div", { class: "frame" }, image, over);
@@ -25,6 +30,7 @@ watchPicture(frame);
 on("picture cell state table line", draw);
 on("status", () => canMark() !== offered && draw());
 onMarking(draw);
+narrow.addEventListener("change", () => draw());
 let offered = false; // marking by hand
 
 function draw() {
@@ -35,16 +41,16 @@ function draw() {
   if (image.getAttribute("src") !== address) image.src = address;
   image.alt = described(view);
   over.setAttribute("viewBox", `0 0 ${view.size[0]} ${view.size[1]}`);
-  frame.classList.toggle("earlier", view.earlier);
-  const marking = marksLayer();
+  frame.classList.toggle("earlier", view.earlier !== false);
+  const marking = marksLayer(tall());
   // Pixel centres lie at whole numbers, the drawing's corner at the picture's.
-  fill(over, s("g", { transform: "translate(0.5 0.5)" }, marking ?? layers(view.earlier ? null : view.solved)));
+  fill(over, s("g", { transform: "translate(0.5 0.5)" }, marking ?? layers(view.earlier === false ? view.solved : null, view.size)));
   fill(tools, markingTools());
   offered = canMark();
   fill(text, caption(view));
 }
 
-function layers(solved) {
+function layers(solved, size) {
   if (!solved) return [];
   const path = (points) => points.map((p, k) => `${p && points[k - 1] ? "L" : "M"}${p ? p.join(" ") : ""}`).filter((d) => d.length > 1).join("");
   return [
@@ -54,19 +60,32 @@ function layers(solved) {
       solved.stations.map((st) => [
         s("path", { class: "dash", d: path(st.ring) }),
         st.at && s("circle", { cx: st.at[0], cy: st.at[1], r: 5 }),
-        st.at && label(st.at, `${st.station_mm} mm`, 12, -12),
       ])),
-    shown.marks && Object.entries(solved.marks).map(([name, mark]) => mark.seen
-      ? s("g", { class: "seen" }, cross(mark.seen, 9), label(mark.seen, name, 9, 20))
-      : mark.predicted && s("g", { class: "missed" }, saltire(mark.predicted, 6), label(mark.predicted, `${name} missing`, 9, 20))),
+    shown.marks && Object.values(solved.marks).map((mark) => mark.seen
+      ? s("g", { class: "seen" }, cross(mark.seen, 9))
+      : mark.predicted && s("g", { class: "missed" }, saltire(mark.predicted, 6))),
     shown.residuals && Object.values(solved.marks).filter((m) => m.seen && m.residual).map((m) =>
       arrow(m.seen, m.residual.map((v) => v * solved.magnified))),
+    names(solved, size),
   ];
+}
+
+// The names lie over everything else, each where it covers least.
+function names(solved, size) {
+  const marks = Object.entries(solved.marks);
+  const wanted = [
+    ...(shown.marks ? marks : []).map(([name, m]) => m.seen ? { text: name, at: m.seen, kind: "seen" }
+      : m.predicted && { text: `${name} missing`, at: m.predicted, kind: "missed" }),
+    ...(shown.leg ? solved.stations : []).map((st) => st.at && { text: `${st.station_mm} mm`, at: st.at, kind: "leg" }),
+  ].filter(Boolean);
+  const arrows = shown.residuals ? marks.filter(([, m]) => m.seen && m.residual) : [];
+  const taken = [...wanted.map(({ at }) => about(at, 9)),
+    ...arrows.flatMap(([, m]) => along(m.seen, m.residual.map((v) => v * solved.magnified)))];
+  return labels(wanted, taken, size, tall());
 }
 
 const cross = ([u, v], r) => s("path", { d: `M${u - r} ${v}H${u + r}M${u} ${v - r}V${v + r}` });
 const saltire = ([u, v], r) => s("path", { d: `M${u - r} ${v - r}L${u + r} ${v + r}M${u - r} ${v + r}L${u + r} ${v - r}` });
-const label = ([u, v], name, du, dv) => s("text", { x: u + du, y: v + dv }, name);
 
 function arrow([u, v], [du, dv]) {
   const length = Math.hypot(du, dv);
@@ -80,9 +99,10 @@ function caption(view) {
   const solved = view.solved;
   const missing = Object.entries(solved?.missing ?? {});
   const from = h("p", { class: "note" }, view.simulated && "Simulated: ", `${view.name.replace("frames/", "")} of session `, report(view.session), ", ", moment(view.started), ". ");
+  if (view.earlier === null) return [h("p", { class: "note" }, h("span", { class: "badge warn" }, "From the records"), " No daemon has been heard: what lies there now is not known."), from];
   if (view.earlier) return [h("p", { class: "note" }, h("span", { class: "badge warn" }, "Earlier session"), " Taken before the daemon started: what lies there now is not known."), from];
   from.append(solved
-    ? h("span", {}, h("strong", { class: solved.accepted ? "good" : "bad" }, solved.accepted ? "Accepted" : "Not accepted"),
+    ? h("span", {}, h("strong", { class: solved.accepted ? "" : "bad" }, solved.accepted ? "Accepted by the picture\u2019s own tests" : "Not accepted"),
       `, residuals ${fixed(solved.rms_px, 3)} px rms, drawn ${solved.magnified} times as long.`)
     : "Not solved: this is the picture as the camera gave it.");
   return [
@@ -96,7 +116,7 @@ function caption(view) {
 }
 
 function described(view) {
-  if (view.earlier) return "A picture of an earlier session.";
+  if (view.earlier !== false) return "A picture of an earlier session.";
   if (!view.solved) return "The camera\u2019s last picture; no leg was found in it.";
   const seen = Object.values(view.solved.marks).filter((m) => m.seen).length;
   return `The camera\u2019s picture of the leg: ${seen} of ${Object.keys(view.solved.marks).length} marks seen, residuals ${fixed(view.solved.rms_px, 3)} px rms.`;

@@ -1,7 +1,7 @@
 // Figures in words: where the arm is, how old the picture is, what the calibration is worth.
 
 import { $, ago, clock, fill, fixed, h, say } from "./dom.js";
-import { repetitions } from "./head.js";
+import { repetitions, simulatedDevices } from "./head.js";
 import { on } from "./live.js";
 
 const cells = {};
@@ -27,7 +27,7 @@ on("arm status", ({ arm, status }) => {
   const where = arm.station_mm !== null && arm.station_mm !== undefined && arm.why && arm.why !== "transit" ? `, ${arm.why} at ${arm.station_mm} mm` : arm.why ? `, ${arm.why}` : "";
   put("touch", arm.contact === null ? "\u2013" : `${arm.contact ? "closed: touching" : "open"}${where}`, arm.contact ? "busy" : "");
   // The simulated world puts its arm in place by itself: nobody has vouched for that.
-  const simulated = status?.simulated;
+  const simulated = simulatedDevices(status).includes("arm");
   const standing = !arm.connected ? "not connected" : !arm.referenced ? "connected, not referenced"
     : simulated ? "connected, in place by simulation" : "connected, referenced";
   put("arm", standing, !arm.connected || !arm.referenced ? "warn" : simulated ? "" : "good");

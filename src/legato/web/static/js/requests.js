@@ -4,20 +4,21 @@ import { act, against, onRights } from "./acts.js";
 import { $, fill, h, keeping } from "./dom.js";
 import { believed, known, on } from "./live.js";
 
-const GROUPS = [["run"], ["capture", "calibrate", "verify", "home", "massage"], ["pause", "resume"], ["reset", "reference"]];
+const GROUPS = [["run"], ["capture", "calibrate", "verify", "home", "massage"], ["pause", "resume"], ["reset", "reference"], ["end_campaign"]];
+const TEXTS = { end_campaign: "End campaign" };
 const buttons = {};
 
 fill($("acts"), GROUPS.map((group) => h("span", { class: "group" }, group.map((method) =>
   (buttons[method] = h("button", {
     type: "button", class: method === "run" ? "plain first" : "plain", "data-method": method,
     onclick: () => (method === "reference" ? askWhere() : act(method)),
-  }, method[0].toUpperCase() + method.slice(1)))))));
+  }, TEXTS[method] ?? method[0].toUpperCase() + method.slice(1)))))));
 buttons.pause.append(" ", h("kbd", {}, "Alt P"));
 
 on("table state line cell", show);
 let lacked = ""; // a status comes every second, and mostly says the same
 on("status", ({ status }) => {
-  const lacks = JSON.stringify(status.lacking ?? {});
+  const lacks = JSON.stringify([status.lacking, status.campaign?.underway && [status.campaign.id, status.campaign.reason]]);
   if (lacks === lacked) return;
   lacked = lacks;
   show();
@@ -35,6 +36,7 @@ function show() {
     buttons.resume.hidden = !paused;
     buttons.pause.hidden = paused;
   }, paused ? buttons.resume : buttons.pause);
+  keeping(() => (buttons.end_campaign.parentElement.hidden = !known.status?.campaign?.underway));
   // What cannot be sent is not offered.
   keeping(() => {
     $("acts").hidden = !believed();
