@@ -90,8 +90,8 @@ def poses(found: Comparison) -> str | None:
     figure.subplots_adjust(wspace=0.22)
     numbers = [number for number, _ in known]
     for axes, values, unit, title in (
-        (panels[0], [p.shift_mm for _, p in known], "mm", "Shift of the leg's middle along"),
-        (panels[1], [p.turn_deg for _, p in known], "deg", "Turn of the leg about"),
+        (panels[0], [p.shift_mm for _, p in known], "mm", "Shift of its middle"),
+        (panels[1], [p.turn_deg for _, p in known], "deg", "Turn"),
     ):
         axes.axhline(0.0, color=SOFT, linewidth=1.0)
         for axis, (name, colour) in enumerate(AXIS_COLOURS.items()):
