@@ -15,7 +15,6 @@ PLACE = re.compile(r"^(?P<text>.*?)(?: - at `\$(?P<path>.*)`)?$", re.DOTALL)
 UNKNOWN = re.compile(r"unknown field `(.*)`", re.DOTALL)
 MISSING = re.compile(r"missing required field `(.*)`", re.DOTALL)
 TOKEN = re.compile(r"\.(?P<name>[^.\[]+)|\[(?P<index>\d+)\]|\[(?P<any>\.\.\.)\]")
-TABLES = (inspect.StructType, inspect.DictType)
 
 
 def refusal(error: msgspec.ValidationError, data: Any, of: type, file: Path) -> ConfigError:
