@@ -9,6 +9,7 @@ from typing import Any
 
 from legato.control.states import CALIBRATE, CAPTURE, VERIFY, massage_state
 from legato.geometry.arm import ArmModel
+from legato.report.happened import listed
 from legato.web.pose import posed
 from legato.web.present import Contacts, Held, leg_told, picture_told
 from legato.web.when import When
@@ -140,13 +141,15 @@ class Board:
             self._latch(None)
 
     def _latch(self, fault: Row | None) -> None:
-        """Keep a fault; status does not tell the evidence that its event told."""
+        """Keep a fault, its evidence in words; status does not tell what its event told of that."""
         if fault is None:
             self._fault = None
-        elif self._fault is None or fault.get("since") != self._fault.get("since"):
-            self._fault = {"evidence": {}, **fault}
-        elif fault.get("evidence"):
-            self._fault = dict(fault)
+        elif (
+            self._fault is None
+            or fault.get("since") != self._fault.get("since")
+            or fault.get("evidence")
+        ):
+            self._fault = {**fault, "evidence": _in_words(fault)}
         self._publish("fault", self._fault)
 
     def _list(self, topic: str, event: Row, wall: str) -> None:
@@ -199,3 +202,9 @@ def _fits(progress: Row, state: str | None) -> bool:
     """Say whether what a progress tells is done in this state."""
     station = progress.get("station_mm")
     return state in LOOKING if station is None else state == massage_state(station)
+
+
+def _in_words(fault: Row) -> list[tuple[str, list[str]]]:
+    """Return what there is of a fault's evidence: each name with its lines."""
+    evidence = {k: v for k, v in (fault.get("evidence") or {}).items() if v not in (None, "", [])}
+    return listed(evidence)

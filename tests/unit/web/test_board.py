@@ -103,9 +103,9 @@ def test_a_fault_keeps_its_evidence_and_goes_with_its_state(board: Board, wall: 
     board.take("fault", event(1, **FAULT, evidence={"state": "idle"}), "0")
     assert not wall["fault"]
     board.take("state", event(2, state="fault", previous="idle", cause="estop"), "0")
-    board.take("fault", event(3, **FAULT, evidence={"state": "idle"}), "0")
+    board.take("fault", event(3, **FAULT, evidence={"state": "idle", "picture": None}), "0")
     board.status({**STATUS, "state": "fault", "fault": FAULT}, "0")
-    assert wall["fault"]["evidence"] == {"state": "idle"}
+    assert wall["fault"]["evidence"] == [("state", ["idle"])]
     board.take("state", event(4, state="idle", previous="fault", cause="reset"), "0")
     assert wall["fault"] is None
 

@@ -33,7 +33,7 @@ on("fault state line", () => {
     if (announced.startsWith("Fault")) urgent("");
     return fill(boxes.fault);
   }
-  const evidence = Object.entries(fault.evidence ?? {}).filter(([, v]) => !empty(v));
+  const evidence = fault.evidence ?? [];
   fill(boxes.fault, h("section", { class: "alert fault", "aria-labelledby": "h-fault" },
     h("h2", { id: "h-fault" }, h("code", {}, fault.cause), ": ", fault.text),
     h("p", {}, h("strong", {}, "What to do: "), marked(fault.hint),
@@ -42,8 +42,9 @@ on("fault state line", () => {
       fault.session && [", in session ", report(fault.session)]),
     evidence.length > 0 && h("details", {},
       h("summary", {}, "Evidence"),
-      h("dl", { class: "evidence" }, evidence.map(([name, value]) =>
-        [h("dt", {}, name.replaceAll("_", " ")), h("dd", {}, plain(value))]))),
+      h("dl", { class: "evidence" }, evidence.map(([name, lines]) =>
+        [h("dt", {}, name), h("dd", {}, lines.length === 1 ? lines[0]
+          : h("ul", {}, lines.map((line) => h("li", {}, line))))]))),
     document.body.dataset.line === "up" && h("div", { class: "row" }, reset(against("reset")))));
   urgent(`Fault ${fault.cause}: ${fault.text}. What to do: ${fault.hint}`);
 });
@@ -61,22 +62,4 @@ export const report = (session, text) =>
 function urgent(text) {
   announced = text;
   say($("urgent"), text);
-}
-
-const empty = (value) => value === null || value === "" || (Array.isArray(value) && !value.length);
-
-function plain(value) {
-  if (Array.isArray(value)) {
-    const deep = value.some((v) => typeof v === "string" && v.length > 24);
-    return deep ? h("ul", {}, value.map((v) => h("li", {}, String(v)))) : value.map(short).join(", ");
-  }
-  if (value && typeof value === "object") {
-    return Object.entries(value).map(([k, v]) => `${k} ${Array.isArray(v) ? `(${v.map(short).join(", ")})` : short(v)}`).join("; ");
-  }
-  return short(value);
-}
-
-function short(value) {
-  if (value === null) return "not known";
-  return typeof value === "number" ? String(Number(value.toPrecision(5))) : String(value);
 }
