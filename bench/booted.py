@@ -30,6 +30,7 @@ PYTHONPATH=/opt/project/src:/opt/packages exec /opt/python/bin/python3 -m legato
 SCALE = 20.0  # of the cell's time
 UP_S, STOP_S, WATCHDOG_S = 60.0, 10.0, 30.0
 NSPAWN = "systemd-nspawn"
+OPERATORS = "/srv/operator"  # the operator's folder, inside
 
 
 class Booted:
@@ -124,7 +125,9 @@ def service(booted: Booted) -> Iterator[Row]:
 
     booted.do("systemctl", "reset-failed", "legato")
     booted.do("sh", "-ec", KEYED)
-    status = json.loads(booted.do("legato", "status", "--json", "--config", "/root/anna.toml"))
+    status = json.loads(
+        booted.do("legato", "status", "--json", "--config", f"{OPERATORS}/anna.toml")
+    )
     see("state behind keys, the secret a credential", status["state"], "idle")
     plain = booted.do("legato", "status", "--config", CONFIG, check=False)
     see("what a plain client is told behind keys", plain, "")
@@ -147,8 +150,9 @@ def struck(booted: Booted, signal: str, limit_s: float) -> float:
     return time.monotonic() - began
 
 
-KEYED = """
-cd /root
+KEYED = f"""
+mkdir -p {OPERATORS}
+cd {OPERATORS}
 legato reset || true
 legato keygen --name cell --role server --out . > /dev/null
 legato keygen --name anna --role operator --out . > /dev/null
@@ -156,9 +160,9 @@ install -D -m 600 cell.secret /etc/credstore/legato.server.secret
 install -D -m 644 anna.public /etc/legato/clients/anna.public
 cp /etc/legato/cell.toml anna.toml
 echo '[server]' | tee -a anna.toml >> /etc/legato/cell.toml
-echo 'curve = { secret = "server.secret", clients = "clients" }' >> /etc/legato/cell.toml
-echo 'client_secret = "/root/anna.secret"' >> anna.toml
-echo 'server_public = "/root/cell.public"' >> anna.toml
+echo 'curve = {{ secret = "server.secret", clients = "clients" }}' >> /etc/legato/cell.toml
+echo 'client_secret = "anna.secret"' >> anna.toml
+echo 'server_public = "cell.public"' >> anna.toml
 cp /etc/legato/*-intrinsics.toml .
 systemctl restart legato
 """

@@ -25,6 +25,7 @@ FLAGS = (
 )  # fmt: skip
 RUN = ["capture", "calibrate", "verify", "move_home", "massage_7", "massage_67", "massage_127",
        "massage_187", "move_home", "idle"]  # fmt: skip
+PASSES = tuple(RUN[4:8])
 LOOK = """
 window.seenStates = [];
 window.contradictions = [];

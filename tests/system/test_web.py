@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page, Position, expect
 
 from tests.system.pictures import CAMERA_AT, LOOKS_AT, two_legs
 from tests.system.process import Daemon, daemon
-from tests.system.site import RUN, Site, browser, cell, page_of, site, until_state
+from tests.system.site import PASSES, RUN, Site, browser, cell, page_of, site, until_state
 
 __all__ = ["browser"]
 
@@ -22,7 +22,6 @@ LENIENT = {"max_mark_size_percent": 1000.0, "max_station_sigma_mm": 1.0}  # for 
 # Whether the lit state of the graph is the page's.
 PRESENT = """document.querySelector('#graph .present text').textContent
     == document.body.dataset.state.replace('_', ' ')"""
-PASSES = "massage_7", "massage_67", "massage_127", "massage_187"
 SPOKEN = {"capture": "Taking a picture", "calibrate": "Finding the leg", "verify": "Verifying",
           "move_home": "Moving home", "idle": "Idle",
           **{state: f"Massage at {state[8:]} mm" for state in PASSES}}  # fmt: skip

@@ -10,14 +10,12 @@ from playwright.sync_api import Browser, Page, expect
 
 from legato.daemon.keys import make_keys
 from tests.system.process import Daemon, daemon
-from tests.system.site import Site, browser, cell, page_of, site, until_state
+from tests.system.site import PASSES, Site, browser, cell, page_of, site, until_state
 from tests.system.test_web_server import serving
 
 __all__ = ["browser"]
 
 expect.set_options(timeout=15_000)
-
-PASSES = "massage_7", "massage_67", "massage_127", "massage_187"
 
 
 @pytest.fixture(scope="module")

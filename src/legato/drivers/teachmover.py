@@ -80,7 +80,8 @@ def open_serial(settings: TeachMoverSettings) -> Port:
         write_timeout=settings.reply_margin_s + LONGEST_LINE * BITS / settings.baud,
         exclusive=True,
     )
-    # USB adapters keep characters back for up to 16 ms, a third of what a read takes; not all obey.
+    # USB adapters keep characters back for up to 16 ms, a third of what a read takes. Not all
+    # obey: the kernel refuses, or pyserial says that this system has no such mode.
     with suppress(OSError, ValueError, NotImplementedError):
         port.set_low_latency_mode(True)
     return port

@@ -33,6 +33,7 @@ def _plain(value: Any) -> object:
         return value.tolist()
     if isinstance(value, Path):
         return str(value)
+    # The error by which msgspec is told that there is no way to write a value.
     raise NotImplementedError(f"a record cannot hold a {type(value).__name__}")
 
 

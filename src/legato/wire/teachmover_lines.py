@@ -4,6 +4,7 @@ A parser never raises anything but WireError, whatever the bytes and however the
 """
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Generic, TypeVar
 
@@ -56,7 +57,7 @@ class Lines:
 Message = TypeVar("Message")
 
 
-class Parser(Generic[Message]):
+class Parser(ABC, Generic[Message]):
     """Bytes in, messages out; after an error only `reset` helps."""
 
     def __init__(self) -> None:
@@ -92,9 +93,9 @@ class Parser(Generic[Message]):
         self._lines.clear()
         self._error = None
 
+    @abstractmethod
     def _message(self, line: bytes) -> Message | None:
         """Return what a line says, None where it says nothing by itself. Raises WireError."""
-        raise NotImplementedError
 
 
 def numbers(text: bytes) -> list[int] | None:
